@@ -2,6 +2,8 @@
 
 use straightline_codegen::diagnostic::{Severity, Source};
 use straightline_codegen::model::{load, ModelOptions};
+use straightline_codegen::verify::verify;
+use straightline_codegen::{compile, Function, Options};
 use straightline_core::algorithms::{inverse_dynamics, mass_matrix};
 use straightline_core::model::Model;
 use straightline_core::Dd;
@@ -9,6 +11,15 @@ use straightline_core::Dd;
 fn model_of(name: &str, text: &str) -> Model<Dd> {
     let (model, diagnostics) = load(&Source::new(name, text), &ModelOptions::default());
     model.unwrap_or_else(|| panic!("{diagnostics}\n{text}"))
+}
+
+/// The compiled robot gives the torques of the second author, who reads the file by itself.
+fn verified(text: &str) {
+    let source = Source::new("robot.sdf", text);
+    let options = Options { functions: vec![Function::InverseDynamics, Function::MassMatrix], ..Options::default() };
+    let generated = compile(&source, &options).unwrap_or_else(|errors| panic!("{}", errors.render()));
+    let verification = verify(&source, &generated, &options, (3, 1), || ()).unwrap_or_else(|why| panic!("{why}"));
+    assert!(verification.passes(), "{:?}", verification.functions);
 }
 
 fn errors_of(text: &str) -> Vec<(&'static str, usize)> {
@@ -77,6 +88,7 @@ fn a_hinge_closes_a_loop_in_its_plane() {
          <equality><connect name=\"stand\" body1=\"rocker\" anchor=\"0.1 0 -0.3\"/></equality></mujoco>"
     );
     assert_eq!(sdf.nv(), 1);
+    verified(&four_bar(&on_the_world(ABOUT_Y)));
     same(&sdf, &model_of("robot.xml", &mjcf));
     // the other way round it is the same hinge
     let turned = on_the_world("<axis><xyz>0 -2 0</xyz></axis>");
@@ -110,6 +122,7 @@ fn a_ball_joint_closes_a_loop_in_space_whichever_joint_comes_first() {
         joint("pin", "revolute", ["rod", "heel"], "<pose>-0.1 0.05 0.05 0 0 0</pose><axis><xyz>0.6 0.8 0</xyz></axis>");
     let sdf = model_of("robot.sdf", &parts(&(ball.clone() + &hinge)));
     assert_eq!(sdf.nv(), 2);
+    verified(&parts(&(ball.clone() + &hinge)));
     // the rod as the child of the heel, about the axis turned round
     let mjcf = format!(
         "<mujoco><option gravity=\"0 0 -9.81\"/><worldbody><body name=\"thigh\" pos=\"0 0 1\"><joint name=\"hip\" axis=\"1 0 0\"/><inertial pos=\"0.02 0.01 -0.2\" {MASS}/>

@@ -7,7 +7,7 @@ use super::frames::WORLD;
 use super::joints::SdfJoint;
 use super::poses::PoseStep;
 use super::Sdf;
-use crate::description::{messages, JointType, LoopPoints, Noted, WrittenLoop};
+use crate::description::{messages, JointType, LoopPoints, Noted, WrittenLink, WrittenLoop};
 use std::collections::{HashMap, VecDeque};
 
 impl SdfJoint<'_, '_> {
@@ -134,7 +134,8 @@ impl<'d, 'i> Sdf<'_, 'd, 'i> {
         let mut link = self.frames[child].name.clone();
         if !pieces.is_empty() {
             let (last, pose) = self.add_chain(link, pieces, &joint.name);
-            link = self.add_carrier(&joint.name);
+            link = Noted::new(self.names.made_up(&format!("{}_end", joint.name.value)), joint.name.place.clone());
+            self.robot.links.push(WrittenLink { name: link.clone(), inertial: None, is_carrier: false });
             self.add_fixed(last, link.clone(), pose);
         }
         let place = joint.name.place.clone();
