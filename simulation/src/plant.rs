@@ -271,7 +271,6 @@ pub fn angle_beyond_sines<'a>(model: &'a Model<f64>, q: &[f64]) -> Option<(&'a s
 
 /// Power that friction in the joints turns into heat \[W\]: Σ (d q̇ + f(q̇)) q̇.
 pub(crate) fn joint_friction(model: &Model<f64>, q: &[f64], qd: &[f64]) -> f64 {
-    let joints = model.bodies.iter().filter(|b| b.joint.kind.is_single());
     let loss = |(v, e): (f64, &JointEffects<f64>)| {
         let coulomb = match e.coulomb {
             Coulomb::Off => 0.0,
@@ -281,7 +280,7 @@ pub(crate) fn joint_friction(model: &Model<f64>, q: &[f64], qd: &[f64]) -> f64 {
         e.damping * v * v + coulomb
     };
     let rates = model.tree_rates(&model.tree_positions(q), qd);
-    joints.map(|b| loss((rates[b.joint.iv], &b.effects))).sum()
+    model.bodies.iter().flat_map(|b| b.joint.rates(&rates).iter().map(|v| loss((*v, &b.effects)))).sum()
 }
 
 /// How often loops are closed: what a step of integration leaves open is small, and each time squares it.

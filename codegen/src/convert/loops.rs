@@ -33,6 +33,8 @@ pub fn by_frames(robot: &mut Description, model: &Model<Dd>) {
             points: LoopPoints::Frames(frames),
             determines: own.iter().map(joint).collect(),
             assembly: written.assembly.clone(),
+            // in its plane a hinge is what its points are
+            hinge: None,
         }));
     }
     robot.loops.clear();

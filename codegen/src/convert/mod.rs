@@ -13,6 +13,7 @@ pub mod compare;
 pub mod forms;
 mod loops;
 pub mod messages;
+mod springs;
 
 use crate::description::write::losses::{Loss, LossWeight};
 use crate::description::write::FormatWriter;
@@ -76,6 +77,7 @@ pub fn convert(
         diagnostics.push(messages::not_written(format.name));
         return None;
     };
+    springs::by_numbers(&mut robot, &model);
     for loss in writer.losses {
         lose(loss, format, options.lossy, &mut robot, diagnostics);
     }

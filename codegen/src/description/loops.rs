@@ -1,8 +1,37 @@
-//! Tables `[[loop]]` of robot files in TOML: where bodies close a loop.
+//! Closed loops: what robot files say of them, and tables `[[loop]]` of those in TOML.
 
 use super::reader::FileReader;
 use super::table::TomlTable;
-use super::{LoopPoints, WrittenLoop};
+use super::Noted;
+
+/// Two points of links that coincide.
+#[derive(Clone, Debug, PartialEq)]
+pub struct WrittenLoop {
+    /// What messages and reports call it.
+    pub name: Noted<String>,
+    /// The points.
+    pub points: LoopPoints,
+    /// The joints that it determines; none: those that do it best.
+    pub determines: Vec<Noted<String>>,
+    /// The assembly in which it closes; `None`: the one in which its joints stand.
+    pub assembly: Option<Noted<WrittenAssembly>>,
+    /// The axis, in the frame of the first link, of a hinge that closes it in its plane; `None`: a ball joint.
+    pub hinge: Option<Noted<[f64; 3]>>,
+}
+
+/// How a file says where a loop closes.
+#[derive(Clone, Debug, PartialEq)]
+pub enum LoopPoints {
+    /// The origins of two frames, named ones or those of links.
+    Frames([Noted<String>; 2]),
+    /// A point of the first link \[m\], and what is there of the second one in the pose of the file.
+    Anchor {
+        /// The links; `None`: the world.
+        links: [Option<Noted<String>>; 2],
+        /// The point in the frame of the first one.
+        point: Noted<[f64; 3]>,
+    },
+}
 
 const LOOP: &[&str] = &["name", "frame", "with", "determines", "assembly"];
 
@@ -47,6 +76,6 @@ impl FileReader<'_> {
         let (one, other) = (end("frame"), end("with"));
         let determines = self.names_at(&table, "determines", "joint");
         let assembly = self.word_at(&table, "assembly", &WrittenAssembly::WORDS);
-        Some(WrittenLoop { name: name?, points: LoopPoints::Frames([one?, other?]), determines, assembly })
+        Some(WrittenLoop { name: name?, points: LoopPoints::Frames([one?, other?]), determines, assembly, hinge: None })
     }
 }

@@ -46,6 +46,7 @@ pub const CODES: &[&str] = &[
     "not-supported-yet",
     "loop-within-body",
     "loop-open",
+    "hinge-out-of-plane",
     "loop-joint",
     "loop-joint-determined",
     "loop-assembly",
@@ -60,6 +61,8 @@ pub const CODES: &[&str] = &[
     "several-coordinates",
     "oblique-plane",
     "negative-effect",
+    "damped-base-stands",
+    "no-oscillation",
     "gear-ratio-zero",
     "gear-ratio-alone",
     "no-links",
@@ -463,6 +466,45 @@ pub fn negative_effect(joint: &str, what: &str, value: f64) -> D {
     D::error("negative-effect", format!("{what} of joint `{joint}` is negative: {value:?}"))
         .detail("it would drive the motion instead of resisting it")
         .help("write its magnitude: tau = I qdd + d qd + f sign(qd) + k (q - rest)")
+}
+
+/// Friction of a base that would drive it.
+pub fn negative_base_damping(value: f64) -> D {
+    D::error("negative-effect", format!("the damping of the base is negative: {value:?}"))
+        .detail("it would drive the motion instead of resisting it")
+        .help("write its magnitude: the base feels -d v and -d ω")
+}
+
+/// Friction of a base that does not move.
+pub fn damped_base_stands(value: f64) -> D {
+    D::error("damped-base-stands", format!("the base has a damping of {value:?}, and does not move"))
+        .detail("the damping acts on the velocities of a base that floats")
+        .help("leave it out, or write `base = \"floating\"`")
+}
+
+/// A hinge that closes a loop which moves in space.
+pub fn hinge_out_of_plane(name: &str) -> D {
+    D::error("hinge-out-of-plane", format!("joint `{name}` closes a loop that does not move in a plane across its axis"))
+        .detail("points that coincide are all that a loop says: in a plane that is a hinge, in space a ball joint")
+        .help(
+            "write a ball joint where the loop has one as the joint whose child hangs on another joint, too, or make all axes of the loop parallel",
+        )
+}
+
+/// A time constant and a damping ratio with which nothing swings.
+pub fn no_oscillation(owner: &str, [time_constant, damping_ratio]: [f64; 2]) -> D {
+    D::error("no-oscillation", format!("springdamper of {owner}: {time_constant:?} s and {damping_ratio:?}"))
+        .detail("a time constant and a damping ratio are positive")
+        .help("write both above zero, or `stiffness` and `damping` in their place")
+}
+
+/// A spring and a damper that no joint has.
+pub fn no_spring_of_oscillation(joint: &str, [stiffness, damping]: [f64; 2]) -> D {
+    D::error("no-oscillation", format!("joint `{joint}` cannot swing as its `springdamper` says"))
+        .detail(format!(
+            "of the inertia that it feels a stiffness {stiffness:e} and a damping {damping:e} would be made"
+        ))
+        .help("give what it moves mass and inertia, or write `stiffness` and `damping` in its place")
 }
 
 /// A gear that stands still.

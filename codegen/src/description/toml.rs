@@ -50,7 +50,7 @@ fn read(source: &Source, diagnostics: &mut Diagnostics) -> Option<Description> {
     let mut convention = None;
     reader.require(&top, "robot", "[robot]\\nname = \"...\"");
     if let Some(robot) = reader.table_at(&top, "robot", "[robot]") {
-        reader.check_keys(&robot, &["name", "gravity", "base", "dh"]);
+        reader.check_keys(&robot, &["name", "gravity", "base", "base_damping", "dh"]);
         reader.require(&robot, "name", "name = \"...\"");
         if let Some(name) = reader.name_at(&robot, "name", "robot") {
             description.name = name;
@@ -58,6 +58,7 @@ fn read(source: &Source, diagnostics: &mut Diagnostics) -> Option<Description> {
         description.gravity = reader.vector_at(&robot, "gravity");
         description.base =
             reader.word_at(&robot, "base", &[("fixed", BaseKind::Fixed), ("floating", BaseKind::Floating)]);
+        description.base_damping = reader.real_at(&robot, "base_damping", Range64::Finite);
         if top.has("dh") {
             reader.require(&robot, "dh", "dh = \"standard\" or dh = \"modified\"");
         }

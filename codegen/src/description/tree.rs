@@ -3,7 +3,7 @@
 //! The one thing that formats say in different ways is where a joint stands ([`Placement`]).
 
 use super::composite::{CompositeKind, WrittenComposite, COMPOSITES};
-use super::loops::WrittenAssembly;
+use super::loops::WrittenLoop;
 use super::{drives, flexible, Angle, FileFormat, Noted, Rotation, WrittenPose};
 use crate::diagnostic::Place;
 use std::collections::HashSet;
@@ -30,6 +30,8 @@ pub struct Description {
     pub gravity: Option<Noted<[f64; 3]>>,
     /// The base, where the file states it.
     pub base: Option<Noted<BaseKind>>,
+    /// Viscous friction on each velocity of a base that floats \[N·s/m of the root link's origin, N·m·s/rad of its turn\].
+    pub base_damping: Option<Noted<f64>>,
     /// The links, in the file's order.
     pub links: Vec<WrittenLink>,
     /// The joints, in the file's order.
@@ -60,6 +62,7 @@ impl Description {
             name,
             gravity: None,
             base: None,
+            base_damping: None,
             links: Vec::new(),
             joints: Vec::new(),
             couplings: Vec::new(),
@@ -143,7 +146,7 @@ impl Description {
         }
     }
 
-    /// Adds what could be read of a link.
+    /// Adds a link.
     pub(crate) fn add_link(&mut self, link: Option<WrittenLink>) {
         self.has_holes |= link.is_none();
         self.links.extend(link);
@@ -314,7 +317,7 @@ impl WrittenJoint {
         }
     }
 
-    /// What belongs to a single coordinate: limits, friction, a rotor and a spring, as far as they are written; zeros add nothing.
+    /// What belongs to a single coordinate, as far as it is written; zeros add nothing.
     pub(crate) fn of_one_coordinate(&self) -> Vec<(&'static str, &Noted<f64>)> {
         let WrittenJoint { limits, drive, .. } = self;
         let given = [
@@ -434,6 +437,19 @@ pub struct JointDrive {
     pub spring_stiffness: Option<Noted<f64>>,
     /// Spring: coordinate without force \[rad or m\].
     pub spring_rest: Option<Noted<f64>>,
+    /// What spring and damper are made of, in place of their numbers.
+    pub oscillation: Option<WrittenOscillation>,
+}
+
+/// How a joint is to swing on its spring and damper in the pose of the file while all others are free: both are made of it.
+#[derive(Clone, Debug, PartialEq)]
+pub struct WrittenOscillation {
+    /// T \[s\], positive.
+    pub time_constant: f64,
+    /// ζ, positive.
+    pub damping_ratio: f64,
+    /// Its place.
+    pub place: Place,
 }
 
 /// A joint whose coordinate follows that of another: q = a q_source + b.
@@ -447,33 +463,6 @@ pub struct WrittenCoupling {
     pub ratio: Noted<f64>,
     /// b \[rad or m\]; 0 where the file says nothing.
     pub offset: Noted<f64>,
-}
-
-/// Two points of links that coincide.
-#[derive(Clone, Debug, PartialEq)]
-pub struct WrittenLoop {
-    /// What messages and reports call it.
-    pub name: Noted<String>,
-    /// The points.
-    pub points: LoopPoints,
-    /// The joints that it determines; none: those that do it best.
-    pub determines: Vec<Noted<String>>,
-    /// The assembly in which it closes; `None`: the one in which its joints stand.
-    pub assembly: Option<Noted<WrittenAssembly>>,
-}
-
-/// How a file says where a loop closes.
-#[derive(Clone, Debug, PartialEq)]
-pub enum LoopPoints {
-    /// The origins of two frames, named ones or those of links.
-    Frames([Noted<String>; 2]),
-    /// A point of the first link \[m\], and what is there of the second one in the pose of the file.
-    Anchor {
-        /// The links; `None`: the world.
-        links: [Option<Noted<String>>; 2],
-        /// The point in the frame of the first one.
-        point: Noted<[f64; 3]>,
-    },
 }
 
 /// A named frame on a link.

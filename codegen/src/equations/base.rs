@@ -9,6 +9,8 @@
 //!
 //! For the wrench on the support the same is so of the wrench in place of the energies.
 
+mod followers;
+
 use crate::equations::reduce::longest_lever;
 use crate::scene::{Gravity, Scene};
 use straightline_core::algorithms as alg;
@@ -39,13 +41,17 @@ pub(crate) fn find(model: &Model<Dd>, frames: &[Transform<Dd>], scene: &Scene) -
     let joint_parameters = model.base_parameters.joint_parameters.clone();
     // whose joints all have coordinates of their own, in motions of those that follow others
     let tree = Model { couplings: Vec::new(), closure: Closure::default(), ..model.clone() };
-    let states = states(model, scene.gravity == Gravity::Input);
-    let search = BaseSearch { model: &tree, coupled: model, frames, states, joint_parameters };
+    let any_gravity = scene.gravity == Gravity::Input;
+    let states = states(model, any_gravity, STATES);
+    let search = BaseSearch { model: &tree, coupled: model, frames, any_gravity, states, joint_parameters };
     let of_forces = search.grouped(&search.by_energies(), &search.joint_parameters);
     let of_support = search.grouped(&search.by_support(), &[]);
+    let told_apart = |found: Vec<BaseParameter>, regressor: OfMotion<'_>, rows: usize| {
+        search.with_rows(search.told_apart(found, regressor, rows), regressor, rows)
+    };
     BaseParameterSets {
-        of_forces: search.with_rows(of_forces, &|model, motion| alg::torque_regressor(model, motion), model.nv()),
-        of_support: search.with_rows(of_support, &|model, motion| alg::base_wrench_regressor(model, motion), 6),
+        of_forces: told_apart(of_forces, &|model, motion| alg::torque_regressor(model, motion), model.nv()),
+        of_support: told_apart(of_support, &|model, motion| alg::base_wrench_regressor(model, motion), 6),
         of_scene: of_scene(model, scene),
         joint_parameters: search.joint_parameters,
     }
@@ -80,7 +86,7 @@ struct SampledMotion {
     gravity: Vec3<Dd>,
 }
 
-fn states(model: &Model<Dd>, any_gravity: bool) -> Vec<SampledMotion> {
+fn states(model: &Model<Dd>, any_gravity: bool, count: usize) -> Vec<SampledMotion> {
     let (lever, mut random) = (longest_lever(model), Random(SEED));
     let mut state = || {
         let mut motion = [model.nq(), model.nv(), model.nv()].map(|n| vec![Dd::ZERO; n]);
@@ -105,7 +111,7 @@ fn states(model: &Model<Dd>, any_gravity: bool) -> Vec<SampledMotion> {
         let of_tree = model.tree_motion(motion.each_ref().map(|x| &x[..])).map(|x| x.into_owned());
         SampledMotion { motion, of_tree, gravity }
     };
-    (0..STATES).map(|_| state()).collect()
+    (0..count).map(|_| state()).collect()
 }
 
 /// Of one body: for each of its parameters, and then of its joint's, that is no base parameter, the factors of those that take its place.
@@ -120,6 +126,8 @@ struct BaseSearch<'a> {
     /// The robot, whose joints may follow others.
     coupled: &'a Model<Dd>,
     frames: &'a [Transform<Dd>],
+    /// Gravity has any direction.
+    any_gravity: bool,
     states: Vec<SampledMotion>,
     joint_parameters: Vec<JointParameter>,
 }
@@ -148,7 +156,7 @@ impl BaseSearch<'_> {
                 }
             }
         }
-        columns.iter().map(|columns| dependence(columns)).collect()
+        columns.iter().map(|columns| dependence(columns, of_body(columns))).collect()
     }
 
     /// What the wrench on the support tells apart of each body.
@@ -180,7 +188,7 @@ impl BaseSearch<'_> {
                 }
             }
         }
-        columns.iter().map(|columns| dependence(columns)).collect()
+        columns.iter().map(|columns| dependence(columns, of_body(columns))).collect()
     }
 
     /// Per unit of the parameters in the reduced frame, from those in the canonical one.
@@ -333,15 +341,20 @@ fn has_energy(kind: JointParameter) -> bool {
     !matches!(kind, JointParameter::Damping | JointParameter::Coulomb)
 }
 
-/// Which of some columns depend on the others, those kept first that are named first in [`KEPT_FIRST`]; each column with what it is the change of.
-fn dependence(columns: &[[Vec<Dd>; 2]]) -> Dependence {
+/// The order in which a body's columns are kept.
+fn of_body(columns: &[[Vec<Dd>; 2]]) -> impl Iterator<Item = usize> {
+    KEPT_FIRST.into_iter().chain(PER_BODY..columns.len())
+}
+
+/// Which of some columns depend on the others, those kept first that are named first; each column with what it is the change of.
+fn dependence(columns: &[[Vec<Dd>; 2]], kept_first: impl Iterator<Item = usize>) -> Dependence {
     let dot = |a: &[Dd], b: &[Dd]| a.iter().zip(b).fold(Dd::ZERO, |sum, (a, b)| sum + *a * *b);
     let greatest = |column: &[Dd]| column.iter().map(|x| x.abs().to_f64()).fold(0.0, f64::max);
     let mut found = Dependence { kept: Vec::new(), dependent: Vec::new() };
     // orthogonal directions of unit length, and what each is of the columns that were kept
     let mut basis: Vec<(Vec<Dd>, Vec<Dd>)> = Vec::new();
     let scale = |k: usize| greatest(&columns[k][1]);
-    for k in KEPT_FIRST.iter().copied().chain(PER_BODY..columns.len()) {
+    for k in kept_first {
         if scale(k) == 0.0 {
             found.dependent.push((k, Vec::new()));
             continue;

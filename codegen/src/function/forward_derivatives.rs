@@ -54,7 +54,7 @@ impl RobotFunction for ForwardDynamicsDerivatives {
             [qdd, derivatives].concat()
         };
         let Some(base) = FallingBase::of(forms.model, &inputs[0], &inputs[1]) else { return of(forms, inputs, None) };
-        let inputs = [inputs[0].clone(), base.at_rest(&inputs[1]), inputs[2].clone()];
+        let inputs = [inputs[0].clone(), base.at_rest(&inputs[1]), base.damped(&inputs[2])];
         forms.weightless(|forms| of(forms, &inputs, Some(&base)))
     }
 

@@ -113,6 +113,7 @@ pub(super) fn assemble(
         carriers: vec![Carrier::rigid(None, Transform::identity()); description.links.len()],
     };
     let is_floating = floats(description, options, diagnostics);
+    check::base_damping(description, is_floating, diagnostics);
     let names: Vec<&str> = description.links.iter().map(|link| link.name.value.as_str()).collect();
     let flexible = match options.rigid_links {
         true => Vec::new(),
@@ -159,7 +160,10 @@ impl Growing<'_> {
         if is_floating {
             let own = root_joint_name(self.description);
             let joint = Joint { name: own, kind: FLOATING_BASE, iq: 0, iv: 0, limits: Limits::default() };
+            let damping = self.description.base_damping.as_ref().map_or(0.0, |damping| damping.value);
+            let effects = JointEffects { damping: Dd::from(damping), ..JointEffects::none() };
             let body = new_body(&name.value, None, joint, Transform::identity(), Transform::identity());
+            let body = Body { effects, ..body };
             let body = self.push(body, &name.place, Vec::new());
             self.carriers[root] = Carrier::rigid(Some(body), Transform::identity());
         }

@@ -9,7 +9,7 @@ use crate::description::{
 use crate::diagnostic::{Diagnostics, Place};
 use crate::model::singular::{singular_joints, Inertia};
 use std::collections::HashMap;
-use straightline_core::joint::Measure;
+use straightline_core::joint::{Dialect, Measure};
 use straightline_core::model::{Coulomb, JointEffects, Limits, Model};
 use straightline_core::spatial::Sym3;
 use straightline_core::Dd;
@@ -225,16 +225,32 @@ pub(super) fn joint(joint: &WrittenJoint, format: &FileFormat, diagnostics: &mut
     }
     limits(&joint.name, joint.kind.value, &joint.limits, format, diagnostics);
     drive(&joint.name, &joint.drive, diagnostics);
-    of_one_coordinate(joint, diagnostics);
+    of_one_coordinate(joint, format, diagnostics);
 }
 
-/// What only a joint of one coordinate has: limits, friction, a rotor and a spring. Of others nothing reads it.
-fn of_one_coordinate(joint: &WrittenJoint, diagnostics: &mut Diagnostics) {
+/// The damping of a base, which floats where it is damped.
+pub(super) fn base_damping(description: &Description, is_floating: bool, diagnostics: &mut Diagnostics) {
+    match &description.base_damping {
+        Some(damping) if damping.value < 0.0 => {
+            diagnostics.push(messages::negative_base_damping(damping.value).at(&damping.place));
+        }
+        Some(damping) if damping.value != 0.0 && !is_floating => {
+            diagnostics.push(messages::damped_base_stands(damping.value).at(&damping.place));
+        }
+        _ => {}
+    }
+}
+
+/// What only a joint of one coordinate has: limits, dry friction, a rotor behind a gear and a spring. Damping and an armature act on every rate alike; what
+/// SDF says of an axis it says of no ball joint.
+fn of_one_coordinate(joint: &WrittenJoint, format: &FileFormat, diagnostics: &mut Diagnostics) {
     let kind = joint.kind.value;
     if kind.between_links().is_none_or(|kind| kind.is_single()) {
         return;
     }
-    for (what, value) in joint.of_one_coordinate() {
+    let of_one =
+        |(what, _): &(&str, &Noted<f64>)| format.dialect == Dialect::Sdf || !["damping", "an armature"].contains(what);
+    for (what, value) in joint.of_one_coordinate().into_iter().filter(of_one) {
         let complaint = messages::several_coordinates(&joint.name.value, kind.word, what);
         diagnostics.push(complaint.at(&value.place));
     }

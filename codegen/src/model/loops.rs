@@ -50,6 +50,11 @@ pub(super) fn resolve(
         }
         let closed = ClosedLoop { name: own.name.value.clone(), ends, directions: Vec::new() };
         let directions = directions(&closed, model, &zero);
+        if let Some(axis) = &own.hinge {
+            if !is_in_plane(own, axis, (&closed, &directions), assembly, (model, &zero)) {
+                diagnostics.push(messages::hinge_out_of_plane(&own.name.value).at(&own.name.place));
+            }
+        }
         loops.push(ClosedLoop { directions, ..closed });
     }
     if loops.len() < written.len() || loops.is_empty() || diagnostics.has_errors() {
@@ -71,7 +76,7 @@ pub(super) fn resolve(
 }
 
 /// The coordinates of the tree in the pose that the file shows.
-fn pose_of_file(description: &Description, model: &Model<Dd>) -> Vec<Dd> {
+pub(super) fn pose_of_file(description: &Description, model: &Model<Dd>) -> Vec<Dd> {
     let mut zero = vec![Dd::ZERO; model.nq()];
     for joint in model.free_joints() {
         if let Some(w) = joint.kind.row().quaternion {
@@ -119,6 +124,25 @@ fn ends(
             Some([one, LoopEnd { body: other.body, point: of_other.rotation.transpose_mul(met) }])
         }
     }
+}
+
+/// Whether the axis of a hinge that closes a loop is the normal of a plane to which all joints of the loop are bound.
+fn is_in_plane(
+    own: &WrittenLoop,
+    axis: &Noted<[f64; 3]>,
+    (closed, directions): (&ClosedLoop<Dd>, &[Vec3<Dd>]),
+    assembly: &Assembly,
+    (model, zero): (&Model<Dd>, &[Dd]),
+) -> bool {
+    let ([across, along], LoopPoints::Anchor { links: [Some(link), _], .. }) = (directions, &own.points) else {
+        return false;
+    };
+    let Some(carrier) = assembly.links.get(&link.value) else { return false };
+    let (body, x_body_link) = carrier.at(Vec3::zero());
+    let in_world = pose(model, zero, body).rotation * (x_body_link.rotation * vector(axis.value));
+    let in_base = pose(model, zero, model.parting(closed)).rotation.transpose_mul(in_world);
+    let normal = across.cross(*along);
+    length(normal.cross(in_base)) < PARALLEL * length(in_base)
 }
 
 fn pose(model: &Model<Dd>, q: &[Dd], body: Option<BodyId>) -> Transform<Dd> {
@@ -233,6 +257,9 @@ impl LoopEquations {
             let square = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(a, b)| a * b).sum::<f64>();
             let mut normal: Vec<Vec<f64>> = rows.iter().map(|a| rows.iter().map(|b| square(a, b)).collect()).collect();
             let trace: f64 = (0..normal.len()).map(|i| normal[i][i]).sum();
+            if trace == 0.0 {
+                break; // no joint moves the points against each other
+            }
             let far = square(&gaps, &gaps).sqrt() / self.size();
             (0..normal.len()).for_each(|i| normal[i][i] += trace * (1e-14 + 1e-2 * far * far));
             let multipliers = eliminated(normal, gaps);

@@ -37,6 +37,7 @@ mod dyads;
 mod flexible;
 pub mod limbs;
 mod loops;
+mod oscillations;
 pub mod singular;
 pub mod states;
 
@@ -184,7 +185,8 @@ pub fn build(description: &Description, options: &ModelOptions, diagnostics: &mu
         diagnostics.push(messages::gravity_out_of_range(&value, GRAVITY).at(&gravity.place));
     }
     let gravity = options.gravity.or(description.gravity.as_ref().map(|g| g.value)).unwrap_or([0.0, 0.0, -9.81]);
-    let bodies = std::mem::take(&mut assembly.bodies);
+    let mut bodies = std::mem::take(&mut assembly.bodies);
+    oscillations::resolve(description, (options, tolerance), &mut bodies, diagnostics);
     let mut model = Model {
         name: description.name.value.clone(),
         bodies,

@@ -6,7 +6,7 @@
 //! limits beyond the range say "no limit" and are written so. A length that vanishes is dust, and vanishes.
 
 use crate::description::drives::WrittenDrive;
-use crate::description::{Description, JointDrive};
+use crate::description::{Description, JointDrive, WrittenOscillation};
 use crate::diagnostic::{Diagnostic, Diagnostics, Place};
 use crate::model::states;
 use crate::scene::{messages as say, Parameter, Scene};
@@ -58,12 +58,19 @@ fn of_joint(name: &str, drive: &JointDrive, number: Number) {
             number(&value.place, format!("{what} of joint `{name}`"), value.value, false);
         }
     }
+    if let Some(WrittenOscillation { time_constant, damping_ratio, place }) = &drive.oscillation {
+        number(place, format!("time constant of joint `{name}`"), *time_constant, true);
+        number(place, format!("damping ratio of joint `{name}`"), *damping_ratio, true);
+    }
 }
 
 /// Gravity, and the numbers of links and joints.
 fn of_bodies(description: &Description, complain: Number) {
     if let Some(gravity) = &description.gravity {
         gravity.value.iter().for_each(|x| complain(&gravity.place, "gravity".to_string(), *x, false));
+    }
+    if let Some(damping) = &description.base_damping {
+        complain(&damping.place, "damping of the base".to_string(), damping.value, false);
     }
     for link in &description.links {
         let (name, Some(inertial)) = (&link.name.value, &link.inertial) else { continue };

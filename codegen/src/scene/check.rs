@@ -11,6 +11,7 @@ use crate::function::{Extent, Function, Output, Parts, SelectedRows};
 use crate::identifier::UNNAMED;
 use crate::model::geometry::principal_moments;
 use crate::model::{is_gravity, GRAVITY};
+use straightline_core::base_parameters::JointParameter;
 use straightline_core::model::{BodyId, Model};
 use straightline_core::spatial::Sym3;
 use straightline_core::Dd;
@@ -224,11 +225,28 @@ pub(super) fn against(model: &Model<Dd>, scene: &Scene, held: &[bool], diagnosti
     if !held.is_empty() && held.iter().all(|held| *held) {
         places.complain("hold.joints", say::nothing_left(&model.name), diagnostics);
     }
+    of_one_coordinate(model, scene, diagnostics);
     frames(model, scene, held, diagnostics);
     if !model.closure.is_empty() && !scene.contacts.is_empty() {
         places.complain("contact", say::not_on_loops("contacts and loops of a scene"), diagnostics);
     }
     check_contact::against(model, scene, held, diagnostics);
+}
+
+/// Columns of regressors belong to joints of one coordinate: what others add, of which forces would be left out, has none.
+fn of_one_coordinate(model: &Model<Dd>, scene: &Scene, diagnostics: &mut Diagnostics) {
+    for parameter in &scene.regressor {
+        let acts = match parameter {
+            JointParameter::Damping => scene.effects.damping,
+            JointParameter::RotorInertia => scene.effects.rotor_inertia,
+            _ => false,
+        };
+        let several = model.bodies.iter().filter(|body| acts && !body.joint.kind.is_single());
+        if let Some(body) = several.into_iter().find(|body| parameter.value(&body.effects) != Dd::ZERO) {
+            let complaint = say::regressor_of_several(&body.joint.name, parameter.word());
+            scene.places.complain("regressor", complaint, diagnostics);
+        }
+    }
 }
 
 /// The body that a frame moves with in this scene.

@@ -77,6 +77,7 @@ pub const CODES: &[&str] = &[
     "function-not-of-robot",
     "function-not-of-scene",
     "regressor-unused",
+    "regressor-of-several",
     "number-beyond-scalar",
     "program-beyond-scalar",
 ];
@@ -645,6 +646,15 @@ pub fn regressor_unused(functions: &[&str]) -> D {
     D::error("regressor-unused", "no function has these columns")
         .detail(format!("they belong to {}, which are made where they are named", list(functions)))
         .help("name one, as in `functions = [\"torque_regressor\"]` under `[outputs]`, or leave `[regressor]` out")
+}
+
+/// Columns of what a joint of several coordinates adds.
+pub fn regressor_of_several(joint: &str, parameter: &str) -> D {
+    D::error("regressor-of-several", format!("joint `{joint}` has {parameter}, and several coordinates"))
+        .detail(
+            "regressors have columns of what joints of one coordinate add: the forces of this joint would be left out",
+        )
+        .help(format!("leave `{parameter}` out of `[regressor]`, or leave it out of the robot"))
 }
 
 /// A function about something that the robot does not have.

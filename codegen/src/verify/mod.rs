@@ -27,6 +27,7 @@ use straightline_graph::schedule::Schedule;
 use straightline_graph::{element_of, Scalar};
 
 mod loops;
+mod oscillation;
 mod reading;
 pub mod reference_input;
 mod whole;

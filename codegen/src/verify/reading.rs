@@ -1,6 +1,7 @@
 //! The second author's reading of a robot file: links from their centres of mass, and what joints add to them.
 
 use super::loops::closed_loops;
+use super::oscillation;
 use super::reference_input::centre_of_mass_tree;
 use crate::description::flexible::{BaseSupport, Bending};
 use crate::description::{self, Description, Noted};
@@ -45,12 +46,21 @@ pub(super) fn second_reading(
         (link.iq, link.iv) = *renumbered.get(&link.iv).ok_or_else(|| format!("`{}` follows nothing", link.name))?;
     }
     let elastic = elastic_springs(&description, &options.model);
+    let swinging = oscillation::springs(&description, &options.model)?;
     let effect = |joint: &Joint| {
         let own = elastic.iter().find(|(name, _)| *name == joint.name);
-        own.map_or_else(|| written(&description, &joint.name), |own| own.1)
+        own.map_or_else(|| written(&description, &joint.name, &swinging), |own| own.1)
     };
-    let own = model.free_joints().filter(|joint| joint.kind.is_single());
-    let own = own.map(|joint| Effect { iq: joint.iq, iv: joint.iv, ..effect(joint) });
+    // of a joint with several rates the same on each; a spring, the one thing that asks for q, it has not
+    let of_base = description.base_damping.as_ref().map_or(Dd::ZERO, |damping| Dd::from(damping.value));
+    let effect = |joint: &Joint| match joint.kind.is_base() {
+        true => Effect { damping: of_base, ..NONE },
+        false => effect(joint),
+    };
+    let own = model.free_joints().flat_map(|joint| {
+        let all = (0..joint.kind.nv()).map(|k| (joint.iq + k, joint.iv + k));
+        all.map(|(iq, iv)| Effect { iq, iv, ..effect(joint) })
+    });
     let following = model.bodies.iter().filter_map(|body| {
         let link = tree.links.iter().find(|link| link.name == body.name)?;
         let shared = link.shared?;
@@ -77,9 +87,12 @@ const NONE: Effect = Effect {
     ratio: Dd::ONE,
 };
 
-/// What the file says of a joint.
-fn written(description: &Description, joint: &str) -> Effect {
+/// What the file says of a joint, with the springs and dampers \[k, d\] of joints that are to swing.
+fn written(description: &Description, joint: &str, swinging: &BTreeMap<String, [Dd; 2]>) -> Effect {
     let drive = description.joint(joint).map(|joint| joint.drive.clone()).unwrap_or_default();
+    let [stiffness, damping] = swinging.get(joint).copied().unwrap_or_else(|| {
+        [&drive.spring_stiffness, &drive.damping].map(|x| Dd::from(x.as_ref().map_or(0.0, |x| x.value)))
+    });
     let number = |x: &Option<Noted<f64>>| Dd::from(x.as_ref().map_or(0.0, |x| x.value));
     let joint = description.joint(joint);
     let limits = joint.map(|joint| joint.limits.clone()).unwrap_or_default();
@@ -88,9 +101,9 @@ fn written(description: &Description, joint: &str) -> Effect {
     let gear = Dd::from(drive.gear_ratio.as_ref().map_or(1.0, |x| x.value));
     Effect {
         inertia: number(&drive.armature) + gear * gear * number(&drive.rotor_inertia),
-        damping: number(&drive.damping),
+        damping,
         friction: number(&drive.friction),
-        stiffness: number(&drive.spring_stiffness),
+        stiffness,
         rest: number(&drive.spring_rest),
         range: [&limits.lower, &limits.upper].map(|x| limit(x).filter(|_| has_range)),
         effort: limit(&limits.effort).map(|x| x.abs()).filter(|x| *x > Dd::ZERO),

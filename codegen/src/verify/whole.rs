@@ -15,7 +15,7 @@ use crate::scene::free_drive::FreeDrive;
 use crate::scene::{Base, CoulombForm, Gravity, Parameter, Scene};
 use nalgebra::{Matrix3, Vector3};
 use std::collections::BTreeMap;
-use straightline_core::model::Model;
+use straightline_core::model::{Joint, Model};
 use straightline_core::random::Random;
 use straightline_core::reference::{CentreOfMassTree, ExtendedPosition};
 use straightline_core::Dd;
@@ -181,7 +181,8 @@ pub(super) fn hold(
     if let Gravity::Constant(gravity) = scene.gravity {
         tree.gravity = Vector3::from(gravity.map(Dd::from));
     }
-    let moves = |iv: usize| model.bodies.iter().any(|b| b.joint.iv == iv && !is_locked(&b.joint.name));
+    let has = |joint: &Joint, iv: usize| (joint.iv..joint.iv + joint.kind.nv()).contains(&iv);
+    let moves = |iv: usize| model.bodies.iter().any(|b| has(&b.joint, iv) && !is_locked(&b.joint.name));
     effects.retain(|effect| moves(effect.iv));
     for effect in effects {
         let wanted = |x: Dd, is_wanted: bool| if is_wanted { x } else { Dd::ZERO };

@@ -378,6 +378,31 @@ fn what_a_format_cannot_say_is_listed_and_nothing_else() {
             "left-out",
         ),
         (
+            "damping of floating bases",
+            "urdf",
+            arm("", "", "")
+                .replace("name = \"arm\"", "name = \"arm\"\nbase = \"floating\"\nbase_damping = 0.5")
+                .replace("name = \"base\"\n", "name = \"base\"\nmass = 1.0\ninertia = [1, 1, 1]\n"),
+            "robot `arm` (line 4)",
+            "not-in-format",
+        ),
+        (
+            "damping of floating bases",
+            "sdf",
+            arm("", "", "")
+                .replace("name = \"arm\"", "name = \"arm\"\nbase = \"floating\"\nbase_damping = 0.5")
+                .replace("name = \"base\"\n", "name = \"base\"\nmass = 1.0\ninertia = [1, 1, 1]\n"),
+            "robot `arm` (line 4)",
+            "not-in-format",
+        ),
+        (
+            "damping of ball joints",
+            "sdf",
+            arm("damping = 0.5", "", "").replace("continuous", "ball"),
+            "joint `shoulder` (line 17)",
+            "not-in-format",
+        ),
+        (
             "floating bases",
             "urdf",
             arm("", "", "")
@@ -471,7 +496,9 @@ fn what_a_format_cannot_say_is_listed_and_nothing_else() {
     for (what, word, text, whom, code) in &rows {
         let source = Source::new(if text.starts_with('<') { "arm.xml" } else { "arm.toml" }, text.clone());
         let (text, said) = converted(&source, target(word), ConvertOptions::default());
-        let of_conversion: Vec<_> = said.iter().filter(|d| CODES.contains(&d.code)).collect();
+        // of a damped base it is said, too, that it floats
+        let is_beside = |code: &str| *what == "damping of floating bases" && code == "said-otherwise";
+        let of_conversion: Vec<_> = said.iter().filter(|d| CODES.contains(&d.code) && !is_beside(d.code)).collect();
         assert_eq!(of_conversion.len(), 1, "{what}, {word}: {said}");
         let complaint = of_conversion[0];
         assert_eq!((complaint.code, complaint.detail.as_str()), (*code, *whom), "{what}, {word}: {said}");

@@ -35,7 +35,7 @@ fn what_changes_the_dynamics_and_is_not_read_is_an_error() {
         (joint, "<joint name=\"j\" axis=\"0 0 0\"/>", "zero-axis", 3),
         (joint, "<joint name=\"j\" class=\"legs\"/>", "unknown-word", 3),
         (joint, "<joint name=\"j\" damping=\"1 2\"/>", "not-supported-yet", 3),
-        (joint, "<joint name=\"j\" springdamper=\"0.1 1\"/>", "not-supported-yet", 3),
+        (joint, "<joint name=\"j\" springdamper=\"0.1 -1\"/>", "no-oscillation", 3),
         (joint, "<joint name=\"j\" armature=\"-1\"/>", "negative-effect", 3),
         (joint, "<joint name=\"j\" pos=\"1 2\"/>", "wrong-count", 3),
         (joint, "<joint name=\"k\"/>", "duplicate-name", 3),

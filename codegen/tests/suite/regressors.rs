@@ -20,7 +20,7 @@ use straightline_core::spatial::Transform;
 use straightline_core::{Dd, Real};
 
 /// Beside what double-double loses.
-const EXACT: f64 = 1e-22;
+pub(crate) const EXACT: f64 = 1e-22;
 
 /// Robots with the number of their base parameters, where it is known: one of a first joint with a vertical axis, seven of any other turn, ten of a free
 /// root; 43 of a Panda (Gaz et al. 2019).
@@ -38,11 +38,11 @@ const LEGGED: [(&str, bool, Option<usize>); 3] =
     [("solo12.urdf", true, Some(10 + 12 * 7)), ("solo12.urdf", false, None), ("hyq.urdf", true, Some(10 + 12 * 7))];
 
 /// A robot with its number of base parameters.
-type Expected = (&'static str, bool, Option<usize>);
+pub(crate) type Expected = (&'static str, bool, Option<usize>);
 
-struct Robots {
-    name: &'static str,
-    robot: Robot,
+pub(crate) struct Robots {
+    pub name: &'static str,
+    pub robot: Robot,
     tree: CentreOfMassTree<Dd>,
     options: Options,
     random: Random,
@@ -51,7 +51,12 @@ struct Robots {
 impl Robots {
     fn new(file: &'static str, floating_base: bool, scene: &str) -> Robots {
         let path = concat!(env!("CARGO_MANIFEST_DIR"), "/../robots/descriptions/").to_string() + file;
-        let source = Source::new(file, std::fs::read_to_string(&path).expect("a robot file"));
+        Robots::of(file, &std::fs::read_to_string(&path).expect("a robot file"), floating_base, scene)
+    }
+
+    /// A robot by its text.
+    pub fn of(file: &'static str, text: &str, floating_base: bool, scene: &str) -> Robots {
+        let source = Source::new(file, text);
         let mut diagnostics = Diagnostics::new();
         let read = scene_file::read(&Source::new("scene.toml", scene), &mut diagnostics);
         let options = read.unwrap_or_else(|| panic!("{}", diagnostics.render())).into_options(Options::default());
@@ -63,23 +68,26 @@ impl Robots {
         let robot = robot.knowing_base_parameters(&[Function::TorqueRegressor], &options.scene);
         let description = description::read(&source, &mut Diagnostics::new()).expect("a robot");
         let mut tree = centre_of_mass_tree(&description, &options.model).expect("a tree");
-        for link in &mut tree.links {
-            let body = robot.model.bodies.iter().find(|body| body.name == link.name).expect("the same links");
-            (link.iq, link.iv) = (body.joint.iq, body.joint.iv);
-        }
+        // joints that follow others have the coordinates of these
+        let place_of = |link: &str| {
+            let body = robot.model.bodies.iter().position(|body| body.name == link).expect("the same links");
+            let source = robot.model.coupling_of(body).map_or(body, |coupling| coupling.source);
+            (robot.model.bodies[source].joint.iq, robot.model.bodies[source].joint.iv)
+        };
+        tree.links.iter_mut().for_each(|link| (link.iq, link.iv) = place_of(&link.name));
         Robots { name: file, robot, tree, options, random: Random(3) }
     }
 
-    fn all(list: &'static [Expected]) -> impl Iterator<Item = (Robots, Option<usize>)> {
+    pub fn all(list: &'static [Expected]) -> impl Iterator<Item = (Robots, Option<usize>)> {
         list.iter().map(|(file, floating, count)| (Robots::new(file, *floating, ""), *count))
     }
 
-    fn columns(&self) -> usize {
+    pub fn columns(&self) -> usize {
         self.robot.model.base_parameters.of_forces.len()
     }
 
     /// q, q̇, q̈.
-    fn state(&mut self) -> [Vec<Dd>; 3] {
+    pub fn state(&mut self) -> [Vec<Dd>; 3] {
         let model = &self.robot.model;
         let mut state = [model.nq(), model.nv(), model.nv()]
             .map(|n| (0..n).map(|_| Dd::from(self.random.symmetric(2.0))).collect());
@@ -91,14 +99,14 @@ impl Robots {
     }
 
     /// Any parameters of the links, such as no bodies may have.
-    fn parameters(&mut self) -> Vec<Dd> {
+    pub fn parameters(&mut self) -> Vec<Dd> {
         let n = Quantity::LinkParameters.len(&self.robot.model, 0);
         // masses are divided by
         (0..n).map(|k| Dd::from(self.random.symmetric(1.0) + if k % 10 == 0 { 2.0 } else { 0.0 })).collect()
     }
 
     /// The results of a program, in double-double.
-    fn run(&self, function: Function, inputs: &[&[Dd]]) -> Vec<Dd> {
+    pub fn run(&self, function: Function, inputs: &[&[Dd]]) -> Vec<Dd> {
         let program = checked(&self.robot, &[], function, &self.options).unwrap_or_else(|wrong| panic!("{wrong}"));
         evaluate(&program.graph, &inputs.concat())
     }
@@ -119,9 +127,9 @@ impl Robots {
     }
 
     /// The second author's robot with these parameters of its links.
-    fn with(&self, parameters: &[Dd]) -> CentreOfMassTree<Dd> {
+    pub fn with(&self, parameters: &[Dd]) -> CentreOfMassTree<Dd> {
         let mut tree = self.tree.clone();
-        let joints = self.robot.model.joints();
+        let joints = self.robot.model.tree_joints();
         for (own, joint) in parameters.chunks(10).zip(joints) {
             let body = self.robot.model.bodies.iter().find(|body| body.joint.name == joint.name).expect("its body");
             let frame = self.tree.frame(&body.name).expect("a frame per link").clone();
@@ -142,11 +150,11 @@ impl Robots {
     }
 }
 
-fn times(y: &[Dd], beta: &[Dd]) -> Vec<Dd> {
+pub(crate) fn times(y: &[Dd], beta: &[Dd]) -> Vec<Dd> {
     y.chunks(beta.len()).map(|row| row.iter().zip(beta).fold(Dd::ZERO, |sum, (y, b)| sum + *y * *b)).collect()
 }
 
-fn hold(what: &str, found: &[Dd], expected: &[Dd], bound: f64) {
+pub(crate) fn hold(what: &str, found: &[Dd], expected: &[Dd], bound: f64) {
     assert_eq!(found.len(), expected.len(), "{what}");
     let scale = expected.iter().map(|x| x.to_f64().abs()).fold(1e-3, f64::max);
     for (k, (x, y)) in found.iter().zip(expected).enumerate() {
@@ -155,7 +163,7 @@ fn hold(what: &str, found: &[Dd], expected: &[Dd], bound: f64) {
     }
 }
 
-fn tau(tree: &CentreOfMassTree<Dd>, [q, qd, qdd]: &[Vec<Dd>; 3]) -> Vec<Dd> {
+pub(crate) fn tau(tree: &CentreOfMassTree<Dd>, [q, qd, qdd]: &[Vec<Dd>; 3]) -> Vec<Dd> {
     reference::inverse_dynamics(tree, q, qd, qdd).iter().copied().collect()
 }
 
@@ -165,7 +173,7 @@ fn base_parameters_of_any_links_give_their_forces() {
     hold_forces(&STANDING);
 }
 
-fn hold_forces(list: &'static [Expected]) {
+pub(crate) fn hold_forces(list: &'static [Expected]) {
     for (mut robot, _) in Robots::all(list) {
         for _ in 0..3 {
             let (state, parameters) = (robot.state(), robot.parameters());
@@ -180,7 +188,7 @@ fn hold_forces(list: &'static [Expected]) {
 }
 
 /// The rank of some rows, by orthogonalisation in double-double.
-fn rank(rows: &[Vec<Dd>]) -> usize {
+pub(crate) fn rank(rows: &[Vec<Dd>]) -> usize {
     let columns = rows[0].len();
     let mut basis: Vec<Vec<Dd>> = Vec::new();
     let dot = |a: &[Dd], b: &[Dd]| a.iter().zip(b).fold(Dd::ZERO, |sum, (a, b)| sum + *a * *b);
@@ -208,7 +216,7 @@ fn columns_are_as_many_as_the_rank() {
     hold_rank(&STANDING);
 }
 
-fn hold_rank(list: &'static [Expected]) {
+pub(crate) fn hold_rank(list: &'static [Expected]) {
     for (mut robot, expected) in Robots::all(list) {
         let (columns, nv) = (robot.columns(), robot.robot.model.nv());
         let program = checked(&robot.robot, &[], Function::TorqueRegressor, &robot.options);
@@ -241,7 +249,7 @@ fn energies_momenta_and_the_wrench_on_the_support_are_those_of_any_links() {
     hold_energies(&STANDING);
 }
 
-fn hold_energies(list: &'static [Expected]) {
+pub(crate) fn hold_energies(list: &'static [Expected]) {
     for (mut robot, _) in Robots::all(list) {
         let (first, second, parameters) = (robot.state(), robot.state(), robot.parameters());
         let tree = robot.with(&parameters);
@@ -285,7 +293,7 @@ fn values_and_names_are_those_of_the_robot() {
     hold_values(&STANDING);
 }
 
-fn hold_values(list: &'static [Expected]) {
+pub(crate) fn hold_values(list: &'static [Expected]) {
     for (robot, _) in Robots::all(list) {
         let model = &robot.robot.model;
         let lists = base_parameter_lists(model, &[Function::TorqueRegressor, Function::BaseWrenchRegressor]);
@@ -318,7 +326,7 @@ fn entries_and_their_places_make_the_matrix() {
     hold_entries(&STANDING);
 }
 
-fn hold_entries(list: &'static [Expected]) {
+pub(crate) fn hold_entries(list: &'static [Expected]) {
     for (mut robot, _) in Robots::all(list) {
         let state = robot.state();
         let inputs = [&state[0][..], &state[1], &state[2]];

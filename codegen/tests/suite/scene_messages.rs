@@ -52,6 +52,7 @@ fn said_of(code: &str) -> Diagnostics {
     }
     let robot = match code {
         "not-on-loops" | "determined-joint" => FOURBAR.to_string(),
+        "regressor-of-several" => ARM.replace("\"continuous\"", "\"spherical\"\ndamping = 0.25"),
         "several-locked" => ARM.replace("\"continuous\"", "\"spherical\""),
         _ => ARM.to_string(),
     };

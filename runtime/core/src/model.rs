@@ -67,7 +67,8 @@ impl Joint {
     }
 }
 
-/// What a joint adds to the rigid bodies, on its own coordinate.
+/// What a joint adds to the rigid bodies, on its own coordinate. One of several coordinates has neither dry friction nor a spring; inertia and damping are
+/// the same on each of its rates, so that they know no direction.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct JointEffects<T> {
     /// Inertia of what turns with the joint and not with the links: rotor inertia times gear ratio squared

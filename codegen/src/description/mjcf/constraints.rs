@@ -33,9 +33,28 @@ impl<'s> Mjcf<'s> {
                 let own = self.read_loop(&given);
                 self.robot.loops.extend(own);
             }
-            "weld" => self.refuse(element, "the equality", "it holds two bodies together in all directions", help),
+            "weld" => {
+                let why = match self.is_moved_from_outside(element) {
+                    true => {
+                        "it pulls at a body that is moved from outside, which controls the robot and is no part of it"
+                    }
+                    false => "it holds two bodies together in all directions",
+                };
+                self.refuse(element, "the equality", why, help);
+            }
             _ => self.refuse(element, "the equality", "it binds the motion", help),
         }
+    }
+
+    /// Whether one of its bodies is a `mocap` body.
+    fn is_moved_from_outside(&self, equality: &Element) -> bool {
+        let names = ["body1", "body2"].map(|name| equality.attribute(name).map(|name| name.value.as_str()));
+        let value = |body: &Element, name: &str| body.attribute(name).map(|own| own.value.trim().to_string());
+        let mut bodies = self.files.elements.iter().filter(|element| element.name == "body");
+        bodies.any(|body| {
+            let is_named = names.iter().flatten().any(|name| value(body, "name").as_deref() == Some(name));
+            is_named && value(body, "mocap").as_deref() == Some("true")
+        })
     }
 
     /// Two sites that coincide, or a point of the first body and what is there of the second one in the pose of the file.
@@ -58,7 +77,7 @@ impl<'s> Mjcf<'s> {
                 LoopPoints::Anchor { links, point: self.vector(given, "anchor", owner, [0.0; 3]) }
             }
         };
-        Some(WrittenLoop { name, points, determines: Vec::new(), assembly: None })
+        Some(WrittenLoop { name, points, determines: Vec::new(), assembly: None, hinge: None })
     }
 
     /// q₁ − ref₁ = a₀ + a₁ (q₂ − ref₂).

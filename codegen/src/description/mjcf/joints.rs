@@ -8,12 +8,14 @@ use super::files::Element;
 use super::{vocabulary, Mjcf};
 use crate::description::{
     messages, AnchoredJoint, JointDrive, JointLimits, JointType, Noted, Placement, PoseCoordinate, WrittenJoint,
-    WrittenLink, WrittenPose,
+    WrittenLink, WrittenOscillation, WrittenPose,
 };
 use straightline_core::joint::Dialect;
 
-/// What a joint that is no turn or slide may not have.
-const EFFECTS: &[&str] = &["stiffness", "damping", "frictionloss", "armature", "springdamper"];
+/// What a free joint may not have: of a damper its six rates have the same.
+const OF_FREE: &[&str] = &["stiffness", "frictionloss", "armature", "springdamper"];
+/// What a ball joint may not have: of a damper and an armature its three rates have the same.
+const OF_BALL: &[&str] = &["stiffness", "frictionloss", "springdamper"];
 
 impl<'s> Mjcf<'s> {
     /// The joints of a body between links, after complaints about others.
@@ -44,7 +46,10 @@ impl<'s> Mjcf<'s> {
                 joints.push(given);
                 continue;
             }
-            self.read_free(&given, owner);
+            let damping = self.read_free(&given, owner);
+            if is_base {
+                self.robot.base_damping = damping;
+            }
             if !is_base || !is_alone {
                 let why = match (is_base, moving) {
                     (true, _) => "the body has further joints".to_string(),
@@ -58,10 +63,10 @@ impl<'s> Mjcf<'s> {
         joints
     }
 
-    /// What a free joint says beside that.
-    fn read_free(&mut self, given: &Defaulted<'s>, owner: &str) {
+    /// What a free joint says beside that: its damping.
+    fn read_free(&mut self, given: &Defaulted<'s>, owner: &str) -> Option<Noted<f64>> {
         let owner = format!("the free joint of {owner}");
-        for name in EFFECTS {
+        for name in OF_FREE {
             let help = "remove it, or write `<freejoint/>`, which takes no defaults";
             self.refuse_number(given, name, &owner, "it would act on a body that moves freely", help);
         }
@@ -69,6 +74,7 @@ impl<'s> Mjcf<'s> {
             let help = "remove it: coordinates are then those of the body frame as it is written";
             self.refuse_attribute(given.element, "align", &owner, "the frame of the body would be another one", help);
         }
+        self.first_number(given, "damping", &owner)
     }
 
     /// Adds the joints of a body, with a link without mass between each and the next.
@@ -121,13 +127,18 @@ impl<'s> Mjcf<'s> {
         let anchor = self.vector(given, "pos", &owner, [0.0; 3]);
         let is_single = kind.kind.is_some_and(|kind| kind.is_single());
         if !is_single {
-            for name in EFFECTS {
+            for name in OF_BALL {
                 let help = "remove it, or write three hinges in its place";
                 self.refuse_number(given, name, &owner, "it would act on a joint with several coordinates", help);
             }
             let axis = Noted::new([0.0, 0.0, 1.0], name.place.clone());
             let placement = Placement::Anchored(AnchoredJoint { origin, anchor, axis, reference: None });
-            let (limits, drive) = (JointLimits::default(), JointDrive::default());
+            let drive = JointDrive {
+                damping: self.first_number(given, "damping", &owner),
+                armature: self.number(given, "armature", &owner),
+                ..JointDrive::default()
+            };
+            let limits = JointLimits::default();
             let kind = Noted::new(kind, name.place.clone());
             return Some(WrittenJoint { name, kind, parent, child, placement, limits, drive });
         }
@@ -195,23 +206,41 @@ impl<'s> Mjcf<'s> {
     }
 
     fn drive(&mut self, given: &Defaulted<'s>, owner: &str, turns: bool) -> JointDrive {
-        let help = "write `stiffness` and `damping` in its place";
-        self.refuse_number(given, "springdamper", owner, "stiffness and damping would follow from the masses", help);
         let help = "remove it: springs are linear";
         self.refuse_number(given, "springyield", owner, "the spring would yield", help);
-        let stiffness = self.first_number(given, "stiffness", owner);
-        let is_sprung = stiffness.as_ref().is_some_and(|k| k.value != 0.0);
+        let oscillation = self.oscillation(given, owner);
+        // both are made of an oscillation, where one is given
+        let [stiffness, damping] = match &oscillation {
+            Some(_) => [None, None],
+            None => ["stiffness", "damping"].map(|name| self.first_number(given, name, owner)),
+        };
+        let is_sprung = oscillation.is_some() || stiffness.as_ref().is_some_and(|k| k.value != 0.0);
         let rest = self.number(given, "springref", owner).filter(|_| is_sprung);
         JointDrive {
-            damping: self.first_number(given, "damping", owner),
+            damping,
             friction: self.number(given, "frictionloss", owner),
             armature: self.number(given, "armature", owner),
             spring_rest: rest.zip(given.attribute("springref")).map(|(rest, attribute)| {
                 Noted::new(if turns { self.radians(rest.value, attribute) } else { rest.value }, rest.place)
             }),
             spring_stiffness: stiffness,
+            oscillation,
             ..JointDrive::default()
         }
+    }
+
+    /// What a joint's spring and damper are to be made of: zeros say nothing, and MuJoCo takes no other pair than a positive one.
+    fn oscillation(&mut self, given: &Defaulted<'s>, owner: &str) -> Option<WrittenOscillation> {
+        let [time_constant, damping_ratio] = self.some_numbers(given, "springdamper", owner)?;
+        let attribute = given.attribute("springdamper")?;
+        if [time_constant, damping_ratio] == [0.0; 2] {
+            return None;
+        }
+        if time_constant <= 0.0 || damping_ratio <= 0.0 {
+            self.complain(attribute, messages::no_oscillation(owner, [time_constant, damping_ratio]));
+            return None;
+        }
+        Some(WrittenOscillation { time_constant, damping_ratio, place: self.place(attribute) })
     }
 
     /// The first of several numbers, where those after it are zero.

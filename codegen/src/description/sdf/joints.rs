@@ -106,7 +106,9 @@ impl<'d, 'i> Sdf<'_, 'd, 'i> {
         let mut axes = Vec::new();
         for (axis, name, is_needed) in [(first, "axis", has_axis), (second, "axis2", has_second)] {
             match axis {
-                Some(axis) if is_needed || (moves && name == "axis") => axes.push(self.read_axis(axis, frame, &owner)),
+                Some(axis) if is_needed => axes.push(self.read_axis(axis, frame, &owner)),
+                // the format knows no property of a ball joint but where it stands
+                Some(axis) if moves && name == "axis" => self.reader.ignore("axis of a ball joint", &tag(axis)),
                 None if is_needed => {
                     let example = format!("<{name}><xyz>0 0 1</xyz></{name}>");
                     self.complain(&tag(element), messages::missing_element(&owner, name, &example));
@@ -162,6 +164,7 @@ impl<'d, 'i> Sdf<'_, 'd, 'i> {
 
     /// Adds the joints to the robot; whether one of them stands on the world.
     pub fn add_joints(&mut self, joints: Vec<SdfJoint<'d, 'i>>) -> bool {
+        let [joints, closing] = self.carrying(joints);
         let has_world = joints.iter().any(|joint| joint.kind.is_some() && joint.bodies[0] == WORLD);
         let place = self.frames[self.model].name.place.clone();
         let world = Noted::new(self.names.made_up("world"), place);
@@ -195,6 +198,10 @@ impl<'d, 'i> Sdf<'_, 'd, 'i> {
                 true => self.add_weld(joint, kind),
                 false => self.add_moving(joint, kind),
             }
+        }
+        for joint in &closing {
+            let first = moved.get(&joint.bodies[1]).cloned().unwrap_or_else(|| joint.name.clone());
+            self.add_closing(joint, &first);
         }
         for joint in &joints {
             self.add_couplings(joint);

@@ -10,6 +10,7 @@
 
 mod axes;
 mod chains;
+mod closing;
 mod couplings;
 mod elements;
 mod frames;

@@ -324,12 +324,7 @@ pub static BALL_JOINTS: Loss = Loss {
     what: "ball joints",
     weight: Data,
     then: "type `spherical` is written, which Straightline reads and other programs may not",
-    find: |robot| {
-        of_joints(robot, |joint| {
-            let is_ball = joint.kind.value.between_links().is_some_and(|kind| !kind.is_single());
-            is_ball.then(|| joint.name.place.clone())
-        })
-    },
+    find: |robot| of_joints(robot, |joint| is_ball(joint).then(|| joint.name.place.clone())),
     remove: |_| (),
 };
 
@@ -344,6 +339,34 @@ pub static FLOATING_BASE: Loss = Loss {
     },
     remove: |_| (),
 };
+
+/// Damping of a base that floats.
+pub static DAMPED_BASE: Loss = Loss {
+    what: "damping of floating bases",
+    weight: Dynamics,
+    then: "the base moves without friction",
+    find: |robot| {
+        let damped = robot.base_damping.iter().filter(|damping| damping.value != 0.0);
+        damped.map(|damping| (format!("robot `{}`", robot.name.value), damping.place.clone())).collect()
+    },
+    remove: |robot| robot.base_damping = None,
+};
+
+/// Damping of ball joints, of which SDF has axes alone.
+pub static DAMPED_BALLS: Loss = Loss {
+    what: "damping of ball joints",
+    weight: Dynamics,
+    then: "the joints turn without friction",
+    find: |robot| {
+        let damping = |joint: &WrittenJoint| joint.drive.damping.clone().filter(|d| is_ball(joint) && d.value != 0.0);
+        of_joints(robot, |joint| damping(joint).map(|damping| damping.place))
+    },
+    remove: |robot| robot.joints.iter_mut().filter(|joint| is_ball(joint)).for_each(|joint| joint.drive.damping = None),
+};
+
+fn is_ball(joint: &WrittenJoint) -> bool {
+    joint.kind.value.between_links().is_some_and(|kind| !kind.is_single())
+}
 
 /// Links that only carry joints, in a body that has several.
 pub static CARRIERS: Loss = Loss {

@@ -118,7 +118,11 @@ impl<'a> Bodies<'a> {
                     _ = writeln!(out, "{}<{element}{name}{pose}>", indent(depth));
                     depth += 1;
                     if joints.is_empty() && floats {
-                        _ = writeln!(out, "{}<freejoint/>", indent(depth));
+                        let damped = self.0.robot.base_damping.as_ref().filter(|damping| damping.value != 0.0);
+                        let joint = damped.map_or("freejoint".to_string(), |damping| {
+                            "joint type=\"free\"".to_string() + &attribute("damping", &number(damping.value))
+                        });
+                        _ = writeln!(out, "{}<{joint}/>", indent(depth));
                     }
                     joints.iter().for_each(|joint| self.add_joint(joint, depth, &mut out));
                     if let Some(inertial) = &link.inertial {

@@ -32,6 +32,7 @@ fn text(robot: &Description) -> String {
         let word = if base.value == BaseKind::Floating { "floating" } else { "fixed" };
         _ = writeln!(out, "base = \"{word}\"");
     }
+    _ = robot.base_damping.iter().try_for_each(|damping| writeln!(out, "base_damping = {}", number(damping.value)));
     for link in &robot.links {
         _ = writeln!(out, "\n[[link]]\nname = {}", string(&link.name.value));
         if let Some(inertial) = &link.inertial {

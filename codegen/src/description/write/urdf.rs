@@ -23,6 +23,7 @@ pub static WRITER: FormatWriter = FormatWriter {
         &losses::FLEXIBLE_LINKS,
         &losses::BALL_JOINTS,
         &losses::FLOATING_BASE,
+        &losses::DAMPED_BASE,
         &losses::CARRIERS,
         &losses::JOINTS_BESIDE_FRAMES,
         &losses::NAMED_FRAMES,

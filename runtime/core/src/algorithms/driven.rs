@@ -692,11 +692,10 @@ pub fn drive_power<T: Real>(
         powers.iter_mut().zip(flow.powers()).for_each(|(sum, power)| *sum = *sum + power);
     }
     let [electrical, joule, friction, gears, dampers, conversion] = powers;
-    let moving = model.bodies.iter().filter(|body: &&Body<T>| body.joint.kind.is_single());
     let rates = &*model.tree_rates(&model.tree_positions(q), qd);
-    let of_joint =
-        |body: &Body<T>| super::effects::friction_force(&body.effects, rates[body.joint.iv]) * rates[body.joint.iv];
-    [electrical, joule, friction, gears, dampers, sum(moving.map(of_joint)), conversion]
+    let of_rate = |(body, qd): (&Body<T>, T)| super::effects::friction_force(&body.effects, qd) * qd;
+    let moving = model.bodies.iter().flat_map(|body| body.joint.rates(rates).iter().map(move |qd| (body, *qd)));
+    [electrical, joule, friction, gears, dampers, sum(moving.map(of_rate)), conversion]
 }
 
 /// Energy \[J\] of the drives: kinetic of rotors and gears, of the springs of elastic stages, of the motors' inductances. Of a

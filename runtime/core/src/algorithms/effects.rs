@@ -1,6 +1,7 @@
 //! What joints add on their own coordinates: rotor inertia, friction, springs.
 //!
-//! tau = (rigid bodies) + I q̈ + d q̇ + f(q̇) + k (q − q₀), joint by joint; a joint of several coordinates adds nothing.
+//! tau = (rigid bodies) + I q̈ + d q̇ + f(q̇) + k (q − q₀), joint by joint; a joint of several coordinates adds d q̇ and, but for a floating base, I q̈ on
+//! each of its rates, the same on all.
 
 use crate::dd::Dd;
 use crate::model::{Coulomb, JointEffects, Model};
@@ -13,9 +14,17 @@ pub fn passive_force<T: Real>(model: &Model<T>, q: &[T], qd: &[T]) -> Vec<T> {
     let q = &*model.tree_positions(q);
     let qd = &*model.tree_rates(q, qd);
     let mut forces = vec![T::zero(); model.tree_nv()];
-    for (i, body) in model.bodies.iter().enumerate().filter(|(_, b)| b.joint.kind.is_single()) {
+    for (i, body) in model.bodies.iter().enumerate() {
+        let e = &body.effects;
+        // most have no damping, and are worth no section of their own
+        if !body.joint.kind.is_single() {
+            for iv in body.joint.iv..body.joint.iv + body.joint.kind.nv() {
+                forces[iv] = e.damping * qd[iv];
+            }
+            continue;
+        }
         T::section("friction and springs", Some(i));
-        let (q, qd, e) = (q[body.joint.iq], qd[body.joint.iv], &body.effects);
+        let (q, qd) = (q[body.joint.iq], qd[body.joint.iv]);
         let spring = e.stiffness * (q - e.spring_rest);
         let friction = friction_force(e, qd);
         forces[body.joint.iv] = (friction + spring).named("passive", i, "");
@@ -41,13 +50,16 @@ fn coulomb_force<T: Real>(effects: &JointEffects<T>, qd: T) -> T {
 /// of joints that loops determine stand behind the independent ones.
 pub fn rotor_inertias<T: Real>(model: &Model<T>) -> Vec<T> {
     let mut inertias = vec![T::zero(); model.open_nv()];
-    for (b, body) in model.bodies.iter().enumerate().filter(|(_, b)| b.joint.kind.is_single()) {
+    for (b, body) in model.bodies.iter().enumerate() {
         let inertia = body.effects.rotor_inertia.unwrap_or_else(T::zero);
-        let (row, inertia) = match model.coupling_of(b) {
-            Some(coupling) => (model.bodies[coupling.source].joint.iv, coupling.ratio * (coupling.ratio * inertia)),
-            None => (body.joint.iv, inertia),
+        let (rows, inertia) = match model.coupling_of(b) {
+            Some(coupling) => {
+                let row = model.bodies[coupling.source].joint.iv;
+                (row..row + 1, coupling.ratio * (coupling.ratio * inertia))
+            }
+            None => (body.joint.iv..body.joint.iv + body.joint.kind.nv(), inertia),
         };
-        inertias[row] = inertias[row] + inertia;
+        rows.for_each(|row| inertias[row] = inertias[row] + inertia);
     }
     inertias
 }

@@ -9,7 +9,8 @@
 //! ∂v̇/∂r = 0    ∂v̇/∂θ = (Rᵀ g)×    ∂v̇/∂v = −ω×    ∂v̇/∂ω = ∂a/∂ω + v×
 //! ```
 //!
-//! and no other acceleration depends on r, θ or v. So nine columns of derivatives of forward dynamics need no solution, and what they are is exact.
+//! and no other acceleration depends on r, θ or v. So nine columns of derivatives of forward dynamics need no solution, and what they are is exact. A damper d on
+//! the base does notice v: its force −d v counts as one from outside, and the columns of v are solved for it.
 
 use super::DerivativeBlocks;
 use crate::joint::quaternion::rotated_back;
@@ -27,6 +28,8 @@ pub struct FallingBase<T> {
     omega: Vec3<T>,
     /// Rᵀ g.
     gravity: Vec3<T>,
+    /// d.
+    damping: T,
 }
 
 impl<T: Real> FallingBase<T> {
@@ -35,14 +38,16 @@ impl<T: Real> FallingBase<T> {
         if !model.closure.is_empty() {
             return None;
         }
-        let mut roots = model.bodies.iter().filter(|body| body.parent.is_none()).map(|body| &body.joint);
-        let joint = roots.next().filter(|joint| joint.kind.is_base() && roots.next().is_none())?;
+        let mut roots = model.bodies.iter().filter(|body| body.parent.is_none());
+        let body = roots.next().filter(|body| body.joint.kind.is_base() && roots.next().is_none())?;
+        let joint = &body.joint;
         let (pose, rates) = (joint.coordinates(q), joint.rates(qd));
         Some(FallingBase {
             first: joint.iv,
             velocity: Vec3::new(rates[0], rates[1], rates[2]),
             omega: Vec3::new(rates[3], rates[4], rates[5]),
             gravity: rotated_back([pose[3], pose[4], pose[5], pose[6]], model.gravity),
+            damping: body.effects.damping,
         })
     }
 
@@ -61,12 +66,18 @@ impl<T: Real> FallingBase<T> {
         self.with_linear(falling, |a| a - (self.omega.cross(self.velocity) - self.gravity))
     }
 
-    /// Of derivatives of forces what is left to be solved for: without the columns of r and θ, and of v.
+    /// τ with what damps v.
+    pub fn damped(&self, tau: &[T]) -> Vec<T> {
+        self.with_linear(tau, |force| force - self.velocity.scale(self.damping))
+    }
+
+    /// Of derivatives of forces what is left to be solved for: without the columns of r and θ, and of those of v with the damper's alone.
     pub fn leave_out(&self, forces: &mut DerivativeBlocks<T>) {
         let nv = forces.tau.len();
         let clear = |row: &mut [T], count: usize| row[self.first..self.first + count].fill(T::zero());
         forces.dtau_dq.chunks_mut(nv).for_each(|row| clear(row, 6));
         forces.dtau_dqd.chunks_mut(nv).for_each(|row| clear(row, 3));
+        (self.first..self.first + 3).for_each(|k| forces.dtau_dqd[k * nv + k] = self.damping);
     }
 
     /// Completes ∂q̈/∂q and ∂q̈/∂q̇, nv × nv, row-major, of accelerations in free fall.

@@ -25,6 +25,8 @@ pub static WRITER: FormatWriter = FormatWriter {
     frames_are_links: false,
     losses: &[
         &losses::ROTORS,
+        &losses::DAMPED_BALLS,
+        &losses::DAMPED_BASE,
         &losses::DRIVES,
         &losses::LOOPS,
         &losses::FLEXIBLE_LINKS,
