@@ -27,6 +27,7 @@ pub const CODES: &[&str] = &[
     "geom-size",
     "mesh-failed",
     "xacro-left",
+    "urdf-loop",
     "missing-element",
     "missing-attribute",
     "repeated-element",
@@ -237,6 +238,15 @@ pub fn xacro_left(what: &str, more: usize) -> D {
     let d = D::error("xacro-left", format!("xacro is not expanded: `{}`", cut(what)));
     let d = if more > 0 { d.detail(format!("and {more} more of the kind")) } else { d };
     d.help("run `xacro FILE.xacro -o FILE.urdf` first and read what it writes")
+}
+
+/// What closes a loop or couples joints in a URDF.
+pub fn urdf_loop(element: &str) -> D {
+    let d = D::error("urdf-loop", format!("`<{element}>` changes the dynamics, and is no settled part of URDF"));
+    match element {
+        "coupling" => d.help("write `<mimic>` in the joint that follows, or `[[coupling]]` in a scene"),
+        _ => d.help("leave it out, write the tree by `straightline convert FILE.urdf FILE.toml`, and close it there by `[[loop]]`"),
+    }
 }
 
 /// An element that must be there.

@@ -30,6 +30,9 @@ fn read(source: &Source, diagnostics: &mut Diagnostics) -> Option<Description> {
     xml::parse(FileReader::new(source, diagnostics), read_document)
 }
 
+/// What programs and proposals close loops and couple joints by: of the dynamics, and settled nowhere.
+const CLOSING: [&str; 4] = ["loop", "loop_joint", "constraint", "coupling"];
+
 fn read_document(mut reader: FileReader, document: &Document) -> Option<Description> {
     let root = document.root_element();
     if root.tag_name().name() != "robot" {
@@ -53,6 +56,7 @@ fn read_document(mut reader: FileReader, document: &Document) -> Option<Descript
                 let joint = read_joint(&mut reader, node, &mut description.couplings);
                 description.add_joint(joint);
             }
+            Some(name) if CLOSING.contains(&name) => reader.complain(&tag(node), messages::urdf_loop(name)),
             _ => skip(&mut reader, "the robot", node, &["link", "joint"]),
         }
     }
@@ -79,7 +83,6 @@ fn skip(reader: &mut FileReader, owner: &str, node: Node, known: &[&str]) {
         "contact",
         "sensor",
         "self_collision_checking",
-        "loop_joint",
         "group",
         "disable_collisions",
         "verbose",

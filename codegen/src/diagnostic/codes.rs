@@ -230,6 +230,7 @@ pub const ALL: &[Code] = &[
     code("unknown-word", Error, "A word that is none of those known there."),
     code("unphysical-body", Error, "Mass and inertia that no body has."),
     code("unyielding-joints", Error, "A shaft that does not give way, geared to several joints."),
+    code("urdf-loop", Error, "An element of a URDF that closes a loop or couples joints, of which there is no settled form."),
     code("written-twice", Error, "Two keys for the same thing."),
     code("wrong-count", Error, "Too many numbers in a list, or too few."),
     code("wrong-type", Error, "A value of another type."),
