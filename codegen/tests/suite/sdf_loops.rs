@@ -1,5 +1,6 @@
 //! Joints of an SDF that close loops: links that are the children of two joints, as legs of Cassie have them.
 
+use crate::robots::Random;
 use straightline_codegen::diagnostic::{Severity, Source};
 use straightline_codegen::model::{load, ModelOptions};
 use straightline_codegen::verify::verify;
@@ -149,4 +150,30 @@ fn what_no_points_can_say_closes_no_loop() {
     ] {
         assert_eq!(errors_of(&text), [expected], "{text}");
     }
+}
+
+/// Five links, joined at random by joints of every kind, to themselves and to the world, too: a robot, or else an error.
+#[test]
+fn however_links_are_joined_there_is_a_robot_or_an_error() {
+    let mut robots = 0;
+    for seed in 0..80 {
+        let mut random = Random(seed);
+        let names = ["world", "a", "b", "c", "d", "e"];
+        let mut parts: Vec<String> = (1..6)
+            .map(|k| link(names[k], &format!("0.{k} 0.1 {} 0.{k} 0 0.3", 0.1 * k as f64), "0.02 0.01 0.1"))
+            .collect();
+        for k in 0..4 + random.below(4) {
+            let kind = ["revolute", "ball", "revolute", "fixed", "prismatic", "universal", "ball"][random.below(7)];
+            let axis = [ABOUT_Y, "<axis><xyz>1 0 1</xyz></axis>"][random.below(2)];
+            let axes =
+                if kind == "universal" { axis.to_string() + "<axis2><xyz>0 0 1</xyz></axis2>" } else { axis.into() };
+            let ends = [names[random.below(6)], names[1 + random.below(5)]];
+            parts.push(joint(&format!("j{k}"), kind, ends, &axes));
+        }
+        let text = robot(&parts);
+        let (model, diagnostics) = load(&Source::new("robot.sdf", text.clone()), &ModelOptions::default());
+        assert_eq!(model.is_none(), diagnostics.has_errors(), "seed {seed}: {diagnostics}\n{text}");
+        robots += usize::from(model.is_some());
+    }
+    assert!(robots > 0, "none of them is a robot");
 }
