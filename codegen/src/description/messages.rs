@@ -47,6 +47,7 @@ pub const CODES: &[&str] = &[
     "not-supported-yet",
     "loop-within-body",
     "loop-open",
+    "loop-locked",
     "hinge-out-of-plane",
     "loop-joint",
     "loop-joint-determined",
@@ -414,6 +415,14 @@ pub fn loop_open(name: &str, gap: f64) -> D {
     D::error("loop-open", format!("loop `{}` is closed in no pose that was found", cut(name)))
         .detail(format!("its points come no nearer than {} m", six_digits(gap)))
         .help("check the points, and the pose in which the file shows the robot: the search begins there")
+}
+
+/// A loop that leaves none of its joints a motion.
+pub fn loop_locked<'a>(name: &str, joints: impl IntoIterator<Item = &'a str>) -> D {
+    let joints: Vec<&str> = joints.into_iter().collect();
+    D::error("loop-locked", format!("loop `{}` holds its joints still: {}", cut(name), list(&joints)))
+        .detail("it has as many equations as its joints have coordinates: in a plane two where all axes are parallel, in space three")
+        .help("write axes that are to be parallel as such, to all digits, or leave the loop a joint that can move")
 }
 
 /// A joint that is not on the loop that determines it.

@@ -53,6 +53,7 @@ pub const ALL: &[Code] = &[
     code("hinge-out-of-plane", Error, "A hinge that closes a loop which does not move in a plane."),
     code("loop-within-body", Error, "A loop whose points belong to one body."),
     code("loop-open", Error, "A loop that cannot be closed."),
+    code("loop-locked", Error, "A loop that leaves none of its joints a motion."),
     code("loop-joint", Error, "A joint that is not on the loop that is to determine it."),
     code("loop-joint-determined", Error, "A joint that is to be determined by loops which leave it no freedom to follow them."),
     code("loop-assembly", Error, "An assembly by name of a loop that closes in steps."),

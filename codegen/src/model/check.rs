@@ -228,6 +228,18 @@ pub(super) fn joint(joint: &WrittenJoint, format: &FileFormat, diagnostics: &mut
     of_one_coordinate(joint, format, diagnostics);
 }
 
+/// Loops that hold all their joints still: bodies that can move in no way are one.
+pub(super) fn loops_move(model: &Model<Dd>, description: &Description, diagnostics: &mut Diagnostics) {
+    for group in &model.closure.groups {
+        if group.dependents.iter().any(|b| !model.movers(*b).is_empty()) {
+            continue;
+        }
+        let joints = group.dependents.iter().map(|b| model.bodies[*b].joint.name.as_str());
+        let own = &description.loops[group.loops[0]].name;
+        diagnostics.push(messages::loop_locked(&own.value, joints).at(&own.place));
+    }
+}
+
 /// The damping of a base, which floats where it is damped.
 pub(super) fn base_damping(description: &Description, is_floating: bool, diagnostics: &mut Diagnostics) {
     match &description.base_damping {

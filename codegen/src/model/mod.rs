@@ -354,6 +354,7 @@ fn close(
         home[after..after + before.kind.nq()].copy_from_slice(before.coordinates(&closure.home));
     }
     model.closure = Closure { home, ..closure };
+    check::loops_move(model, description, diagnostics);
     dyads::keep_assemblies(model, description, diagnostics);
 }
 
