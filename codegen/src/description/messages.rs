@@ -414,15 +414,26 @@ pub fn loop_within_body(name: &str) -> D {
 pub fn loop_open(name: &str, gap: f64) -> D {
     D::error("loop-open", format!("loop `{}` is closed in no pose that was found", cut(name)))
         .detail(format!("its points come no nearer than {} m", six_digits(gap)))
-        .help("check the points, and the pose in which the file shows the robot: the search begins there")
+        .help(match gap < OF_ROUNDED_NUMBERS {
+            true => PARALLEL_AXES,
+            false => "check the points, and the pose in which the file shows the robot: the search begins there",
+        })
+        .option("angle_tolerance", Some("1e-5".to_string()))
 }
+
+/// Gaps below this \[m\] are what rounded numbers leave open.
+const OF_ROUNDED_NUMBERS: f64 = 1e-4;
+
+const PARALLEL_AXES: &str =
+    "write axes that are to be parallel as such, to all digits; `{option}` takes angles that are nearly right as exact";
 
 /// A loop that leaves none of its joints a motion.
 pub fn loop_locked<'a>(name: &str, joints: impl IntoIterator<Item = &'a str>) -> D {
     let joints: Vec<&str> = joints.into_iter().collect();
     D::error("loop-locked", format!("loop `{}` holds its joints still: {}", cut(name), list(&joints)))
         .detail("it has as many equations as its joints have coordinates: in a plane two where all axes are parallel, in space three")
-        .help("write axes that are to be parallel as such, to all digits, or leave the loop a joint that can move")
+        .help(PARALLEL_AXES)
+        .option("angle_tolerance", Some("1e-5".to_string()))
 }
 
 /// A joint that is not on the loop that determines it.
