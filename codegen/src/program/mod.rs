@@ -137,8 +137,9 @@ fn optimised_with(
             true => check("dead code", dead_code(&check("sums", sums(&graph)))),
             false => graph,
         };
-        // what loops determine is formed of few values in many ways
-        let of_loops = if robot.model.closure.is_empty() { 0 } else { SUBSTITUTED_ON_LOOPS };
+        // what dependent joints move is formed of few values in many ways; how loops close is not
+        let is_moved = !robot.model.closure.is_empty() && function.spec().family != Family::Loops;
+        let of_loops = if is_moved { SUBSTITUTED_ON_LOOPS } else { 0 };
         let largest = function.spec().substituted_up_to.max(of_loops);
         let graph = match optimisations.substitutes && largest > 0 {
             true => check("substitute", substitute(&graph, largest, &choose::keeps_digits_of(&robot.model, &graph))),
