@@ -155,20 +155,20 @@ impl<T: Real> DyadPose<T> {
         let (moved, fixed, square) = self.of_crank(side);
         let axis = self.crank.rotation.column(2);
         let apart = moved - fixed;
-        let a = self.from_crank(fixed).dot(self.from_crank(moved))
-            - axis.dot(self.from_crank(fixed)) * axis.dot(self.from_crank(moved));
+        let a = self.seen_from_crank(fixed).dot(self.seen_from_crank(moved))
+            - axis.dot(self.seen_from_crank(fixed)) * axis.dot(self.seen_from_crank(moved));
         let more = (apart.dot(apart) - square) * T::constant(Dd::HALF);
         turn_to(a, self.turning(side), more, way)
     }
 
-    fn from_crank(&self, point: Vec3<T>) -> Vec3<T> {
+    fn seen_from_crank(&self, point: Vec3<T>) -> Vec3<T> {
         point - self.crank.translation
     }
 
     /// B of a hinge.
     fn turning(&self, side: CrankSide) -> T {
         let (moved, fixed, _) = self.of_crank(side);
-        self.from_crank(fixed).dot(self.crank.rotation.column(2).cross(self.from_crank(moved)))
+        self.seen_from_crank(fixed).dot(self.crank.rotation.column(2).cross(self.seen_from_crank(moved)))
     }
 
     /// B of a slide.
@@ -228,7 +228,7 @@ fn twice_arc_tangent<T: Real>(t: T) -> T {
     let halved = (0..HALVINGS).fold(t, |t, _| t / (T::one() + (T::one() + t * t).sqrt()));
     let square = halved * halved;
     let coefficient = |k: u32| {
-        let sign = if k % 2 == 0 { Dd::ONE } else { -Dd::ONE };
+        let sign = if k.is_multiple_of(2) { Dd::ONE } else { -Dd::ONE };
         T::constant(sign / Dd::from(f64::from(2 * k + 1)))
     };
     let series = (0..TERMS - 1).rev().fold(coefficient(TERMS - 1), |sum, k| coefficient(k) + square * sum);
