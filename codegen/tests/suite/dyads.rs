@@ -3,7 +3,7 @@
 use crate::data::reference_file;
 use straightline_codegen::diagnostic::Source;
 use straightline_codegen::model::{load, ModelOptions};
-use straightline_core::closure::Dyad;
+use straightline_core::closure::{Dyad, DyadWay};
 use straightline_core::model::Model;
 use straightline_core::random::Random;
 use straightline_core::Dd;
@@ -205,7 +205,13 @@ fn closed_near_home(model: &Model<Dd>, random: &mut Random, bound: f64) -> Vec<f
 fn the_closed_form_is_where_newtons_method_ends() {
     for (name, model) in robots() {
         let numbers = model.cast::<f64>();
-        let mut random = Random(11);
+        let (mut random, mut kept) = (Random(11), 0);
+        let ways = |q: &[f64]| -> Vec<DyadWay> {
+            let groups = numbers.closure.groups.iter();
+            let own =
+                groups.map(|group| (group.dyad.as_ref().expect("it has one"), &numbers.closure.loops[group.loops[0]]));
+            own.map(|(dyad, of)| dyad.way_at(&numbers, of, q)).collect()
+        };
         for _ in 0..50 {
             let q = closed_near_home(&model, &mut random, 0.2);
             let mut from = q.clone();
@@ -221,10 +227,14 @@ fn the_closed_form_is_where_newtons_method_ends() {
             for (found, exact) in found.iter().zip(&exact) {
                 assert!((exact.to_f64() - found).abs() < 2e-14, "{name}: {found} {exact:?}");
             }
-            // near a dead point q is only as exact as the root of its gap
-            let near = |(a, b): (&f64, &f64)| (a - b).abs() < 1e-5;
-            assert!(found.iter().zip(&q).all(near), "{name}: another assembly, {found:?} {q:?}");
+            // joints that were moved past a dead point stand in the other assembly; near one q is only as exact as the root of its gap
+            if ways(&from) == ways(&q) {
+                let near = |(a, b): (&f64, &f64)| (a - b).abs() < 1e-5;
+                assert!(found.iter().zip(&q).all(near), "{name}: another assembly, {found:?} {q:?}");
+                kept += 1;
+            }
         }
+        assert!(kept > 30, "{name}: {kept}");
     }
 }
 
