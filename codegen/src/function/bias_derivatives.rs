@@ -33,7 +33,7 @@ impl RobotFunction for GravityDerivative {
     fn evaluate<T: Real>(forms: &Forms<'_, T>, inputs: &[Vec<T>]) -> Vec<T> {
         let (q, model, rest) = (&inputs[0], forms.model, forms.rest());
         let nv = rest.len();
-        let Some([torques, _]) = forms.reduced else {
+        let Some(torques) = forms.with_columns() else {
             let wide = model.map(Dual::<T, 1>::fixed);
             let columns: Vec<_> = (0..nv).map(|k| alg::gravity_force(&wide, &along(model, q, k))).collect();
             let entry = |k: usize| columns[k % nv][k / nv].derivatives[0];
@@ -101,14 +101,12 @@ impl RobotFunction for CoriolisMatrix {
         let (q, qd) = (&inputs[0], &inputs[1]);
         let (nv, rest) = (qd.len(), forms.rest());
         let of_loops = forms.closed([q, qd, &rest]).map(|closed| closed.coriolis_matrix());
-        let c = of_loops.unwrap_or_else(|| {
-            match forms.reduced.map(|[torques, _]| torques).filter(|form| rates_are_of_coordinates(form)) {
-                Some(torques) => {
-                    let half: Vec<T> = qd.iter().map(|rate| *rate * T::constant(straightline_core::Dd::HALF)).collect();
-                    forms.rigid_derivatives(torques, [q, &half, &rest]).dtau_dqd
-                }
-                None => alg::coriolis_matrix(forms.model, q, qd),
+        let c = of_loops.unwrap_or_else(|| match forms.with_columns().filter(|form| rates_are_of_coordinates(form)) {
+            Some(torques) => {
+                let half: Vec<T> = qd.iter().map(|rate| *rate * T::constant(straightline_core::Dd::HALF)).collect();
+                forms.rigid_derivatives(torques, [q, &half, &rest]).dtau_dqd
             }
+            None => alg::coriolis_matrix(forms.model, q, qd),
         });
         // one triangle, so that both are the same to the bit
         let rate = |i: usize, j: usize| c[i * nv + j] + c[j * nv + i];

@@ -181,7 +181,7 @@ impl<T: Real> Forms<'_, T> {
 
     /// τ = H q̈ + h and its derivatives.
     pub fn inverse_dynamics_derivatives(&self, motion: [&[T]; 3]) -> DerivativeBlocks<T> {
-        let Some([torques, _]) = self.reduced else { return by_directions(self.model, motion) };
+        let Some(torques) = self.with_columns() else { return by_directions(self.model, motion) };
         let rigid = self.rigid_derivatives(torques, motion);
         let mut all = DerivativeBlocks {
             mass_matrix: self.with_rotors(motion[0], rigid.mass_matrix),
@@ -224,7 +224,7 @@ impl<T: Real> Forms<'_, T> {
 
     /// ∂(H x)/∂q of an x that is held, by rows: what inverse dynamics does at rest, without gravity.
     pub(crate) fn inertial_slopes(&self, q: &[T], x: &[T]) -> Vec<T> {
-        if let Some([torques, _]) = self.reduced {
+        if let Some(torques) = self.with_columns() {
             let weightless = ReducedModel { gravity: Vec3::zero(), ..torques.clone() };
             return self.rigid_derivatives(&weightless, [q, &self.rest(), x]).dtau_dq;
         }

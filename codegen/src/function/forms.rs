@@ -85,6 +85,11 @@ impl<'a, T: Real> Forms<'a, T> {
         self.with_effects(self.rigid_forces(torques, [q, qd, qdd]), [q, qd, qdd])
     }
 
+    /// The reduced robot that derivatives have a structured form on.
+    pub(super) fn with_columns(&self) -> Option<&'a ReducedModel<T>> {
+        self.reduced.map(|[torques, _]| torques).filter(|torques| torques.has_columns())
+    }
+
     /// Forces of the bodies by a reduced robot, which is a tree whose joints all have coordinates of their own.
     fn rigid_forces(&self, torques: &ReducedModel<T>, motion: [&[T]; 3]) -> Vec<T> {
         let [q, qd, qdd] = &self.model.tree_motion(motion);

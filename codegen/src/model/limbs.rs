@@ -12,10 +12,13 @@ pub struct Limbs {
     pub bodies: Vec<Vec<BodyId>>,
 }
 
-/// All identical limbs of a robot, those nearest to the base where some carry others; none of a robot without a reduced form.
+/// All identical limbs of a robot, those nearest to the base where some carry others; none of a robot without a reduced form, or with ball joints.
 pub fn limbs<T>(model: &Model<T>) -> Vec<Limbs> {
     let mut found = Vec::new();
-    let is_reduced = model.bodies.iter().all(|body| ReducedJoint::of(body.joint.kind).is_some());
+    let is_reduced = model
+        .bodies
+        .iter()
+        .all(|body| ReducedJoint::of(body.joint.kind).is_some_and(|joint| joint != ReducedJoint::Ball));
     if !is_reduced || !model.is_tree() {
         return found;
     }

@@ -9,13 +9,13 @@ use straightline_codegen::verify::verify;
 use straightline_codegen::{compile, Function};
 
 /// Files with their robots' rotations as angles of f64: up to a rounding those of the data.
-const ROBOTS: [(&str, &str); 3] = [
+pub const ROBOTS: [(&str, &str); 3] = [
     ("ball_pendulum", include_str!("../files/ball_pendulum.toml")),
     ("ball_chain", include_str!("../files/ball_chain.toml")),
     ("ball_float", include_str!("../files/ball_float.toml")),
 ];
 
-fn robot(name: &str, text: &str) -> Robot {
+pub fn robot(name: &str, text: &str) -> Robot {
     let source = Source::new(&format!("{name}.toml"), text);
     let (model, said): (_, Diagnostics) = model::load(&source, &ModelOptions::default());
     Robot::new(model.unwrap_or_else(|| panic!("{}", said.render())))
@@ -99,7 +99,7 @@ fn with_three_for_each(text: &str) -> String {
     out.join("\n[[")
 }
 
-/// Three revolute joints have a reduced form besides, of their own and of all joints beside them, and so the most that can be said is a ratio.
+/// A sine and its cosine are no operations here, and a ball joint has none.
 #[test]
 fn a_ball_joint_takes_about_as_many_operations_as_three_revolute_joints_and_no_sines() {
     for (name, text) in ROBOTS {
@@ -112,7 +112,7 @@ fn a_ball_joint_takes_about_as_many_operations_as_three_revolute_joints_and_no_s
         let ratio = ball.flops() as f64 / three.flops() as f64;
         let [sines, of_three] = [ball.sin_cos, three.sin_cos];
         println!("{name:14} {} operations, {sines} sines; {}, {of_three}: {ratio:.3}", ball.flops(), three.flops());
-        assert!(ratio <= 1.22, "{name}: {ratio}");
+        assert!(ratio <= 1.15, "{name}: {ratio}");
         assert_eq!(of_three - sines, 3 * text.matches("\"spherical\"").count());
     }
 }

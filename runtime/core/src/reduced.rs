@@ -23,6 +23,8 @@ pub enum ReducedJoint {
     Slide,
     /// Moves freely in the world.
     Free,
+    /// Turns about all axes.
+    Ball,
 }
 
 impl ReducedJoint {
@@ -31,7 +33,8 @@ impl ReducedJoint {
         match kind.elementary() {
             Some(Measure::Angle) => Some(ReducedJoint::Turn),
             Some(Measure::Length) => Some(ReducedJoint::Slide),
-            None => (kind == FLOATING_BASE).then_some(ReducedJoint::Free),
+            None if kind == FLOATING_BASE => Some(ReducedJoint::Free),
+            None => kind.turns_freely().then_some(ReducedJoint::Ball),
         }
     }
 
@@ -40,6 +43,7 @@ impl ReducedJoint {
         match self {
             ReducedJoint::Turn | ReducedJoint::Slide => 1,
             ReducedJoint::Free => FLOATING_BASE.nq(),
+            ReducedJoint::Ball => 4,
         }
     }
 
@@ -48,6 +52,7 @@ impl ReducedJoint {
         match self {
             ReducedJoint::Turn | ReducedJoint::Slide => 1,
             ReducedJoint::Free => FLOATING_BASE.nv(),
+            ReducedJoint::Ball => 3,
         }
     }
 }
@@ -100,6 +105,14 @@ pub struct ReducedBody<T> {
     pub doubled: [bool; 2],
 }
 
+impl<T: Real> ReducedBody<T> {
+    /// The quaternion (x, y, z, w) of a floating base or a ball joint, which are the last of its coordinates.
+    pub fn quaternion(&self, q: &[T]) -> [T; 4] {
+        let first = self.iq + self.kind.nq() - 4;
+        [q[first], q[first + 1], q[first + 2], q[first + 3]]
+    }
+}
+
 /// How many joints from the base, at most, the motions of a joint meet the wrenches of a joint behind it, in derivatives of inverse dynamics.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 pub struct Meeting {
@@ -133,10 +146,15 @@ impl<T: Real> ReducedModel<T> {
         self.bodies.iter().map(|b| b.kind.nv()).sum()
     }
 
-    /// Whether it stands for this robot: a robot with other joints than turning and sliding ones has no reduced form, and its reduced robot no
+    /// Whether it stands for this robot: a robot with other joints than those of [`ReducedJoint`] has no reduced form, and its reduced robot no
     /// bodies.
     pub fn serves<U>(&self, model: &Model<U>) -> bool {
         self.bodies.len() == model.bodies.len()
+    }
+
+    /// Whether derivatives have a structured form on it: its columns are written for single coordinates and a floating base.
+    pub fn has_columns(&self) -> bool {
+        self.bodies.iter().all(|body| body.kind != ReducedJoint::Ball)
     }
 
     /// Whether a body may [stay](ReducedBody::stays): it turns, and all that it carries turns about parallel axes.

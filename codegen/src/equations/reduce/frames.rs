@@ -5,6 +5,8 @@ use super::*;
 /// For each body the pose of its new frame in its canonical one: turned about z and shifted along it; for a prismatic
 /// joint the origin may be anywhere.
 ///
+/// A floating base and a body on a ball joint keep theirs, as their rates are along its axes.
+///
 /// From the tips to the base: x along the common normal to the axis of the first child with the most descendants, the
 /// origin at the normal's foot.
 pub(super) fn choose_frames(model: &Model<Dd>, lever: f64, choice: &FreeTerms) -> Vec<Transform<Dd>> {
@@ -22,10 +24,15 @@ pub(super) fn choose_frames(model: &Model<Dd>, lever: f64, choice: &FreeTerms) -
     let mut chosen = vec![Transform::identity(); n];
     for i in (0..n).rev() {
         let body = &model.bodies[i];
-        if body.joint.kind.is_base() {
+        if body.joint.kind.is_base() || body.joint.kind.turns_freely() {
             continue;
         }
         chosen[i] = match primary(i) {
+            // no axis to go by: as it stands, level with the ball
+            Some(c) if model.bodies[c].joint.kind.turns_freely() => {
+                let p = model.bodies[c].placement.translation;
+                pose_about_z(body, (Dd::ONE, Dd::ZERO), p.z, Some(p), lever)
+            }
             Some(c) => {
                 let before = foot_before(model, body, lever).filter(|_| choice.origin_at_parent[i]);
                 along_common_normal(body, &model.bodies[c], &chosen[c], before, lever)
@@ -100,7 +107,8 @@ pub(super) fn tip_frame(model: &Model<Dd>, body: &Body<Dd>, lever: f64) -> Trans
     let (r, p) = (body.placement.rotation, body.placement.translation);
     let u = r.column(2);
     let sine2 = u.x * u.x + u.y * u.y;
-    if body.parent.is_none_or(|p| model.bodies[p].joint.kind.is_base()) {
+    let has_axis = |p: BodyId| !(model.bodies[p].joint.kind.is_base() || model.bodies[p].joint.kind.turns_freely());
+    if !body.parent.is_some_and(has_axis) {
         return Transform::identity();
     }
     if sine2.hi() > NEARLY_PARALLEL * NEARLY_PARALLEL {

@@ -95,7 +95,7 @@ impl<T: Real> MotionSweep<'_, T> {
         let carried = self.links[parent].spin.omega.cross(self.links[i].arm);
         match body.kind {
             ReducedJoint::Slide => carried + body.rotation.column(2).scale(self.qd[body.iv]),
-            ReducedJoint::Turn | ReducedJoint::Free => carried,
+            ReducedJoint::Turn | ReducedJoint::Free | ReducedJoint::Ball => carried,
         }
     }
 

@@ -67,6 +67,7 @@ pub(super) fn along_joint<T: Real>(
     match body.kind {
         ReducedJoint::Turn => set(body.iv, w.moment.z),
         ReducedJoint::Slide => set(body.iv, w.force.z),
+        ReducedJoint::Ball => w.moment.to_array().into_iter().enumerate().for_each(|(k, x)| set(body.iv + k, x)),
         ReducedJoint::Free => {
             let both = w.force.scale(model.per_unit).to_array().into_iter().chain(w.moment.to_array());
             both.enumerate().for_each(|(k, x)| set(body.iv + k, x));
@@ -189,6 +190,12 @@ impl<T: Real> CarriedMotion<T> {
                     angular[iv] = n.z;
                 }
                 ReducedJoint::Slide => linear[iv] = f.z,
+                ReducedJoint::Ball => {
+                    let about = r.cross(f).to_array();
+                    for (k, (n, about)) in n.to_array().into_iter().zip(about).enumerate() {
+                        (linear[iv + k], angular[iv + k]) = (about, n);
+                    }
+                }
                 ReducedJoint::Free => {
                     let about = r.cross(f).to_array();
                     for (k, (n, about)) in n.to_array().into_iter().zip(about).enumerate() {
@@ -365,13 +372,22 @@ impl<T: Real> DescribedMotion<T> {
                 let accel = (at_joint + field + coriolis).named("accel", i);
                 at_rest(spin, accel, arm + body.rotation.column(2).scale(q))
             }
+            ReducedJoint::Ball => {
+                let triple = |x: &[T]| Vec3::new(x[iv], x[iv + 1], x[iv + 2]);
+                let (rate, rate_rate) = (triple(qd), triple(qdd));
+                let carried = turn.parent_to_base(body, self.spin.omega);
+                // ε = Rᵀ ε_p + ω̇ + (Rᵀ ω_p) × ω of the joint, in own axes
+                let alpha = turn.parent_to_base(body, self.spin.alpha) + rate_rate + carried.cross(rate);
+                let accel = turn.parent_to_base(body, self.accel + self.spin.u * arm);
+                let spin = Spin::new((carried + rate).named("omega", i), alpha.named("alpha", i));
+                at_rest(spin, accel.named("accel", i), arm)
+            }
             ReducedJoint::Free => {
                 let triple = |x: &[T], k: usize| Vec3::new(x[iv + k], x[iv + k + 1], x[iv + k + 2]);
                 let (omega, alpha) = (triple(qd, 3), triple(qdd, 3));
                 // v̇ + ω × v − Rᵀ g
                 let moving = (triple(qdd, 0) + omega.cross(triple(qd, 0))).scale(per_unit);
-                let k = body.iq + 3;
-                let accel = moving + rotated_back([q[k], q[k + 1], q[k + 2], q[k + 3]], self.accel);
+                let accel = moving + rotated_back(body.quaternion(q), self.accel);
                 at_rest(Spin::new(omega, alpha), accel.named("accel", i), arm)
             }
         }

@@ -7,11 +7,11 @@
 //! −g of a joint near the base still has zeros.
 
 use super::reduced_turn::own_angle;
-use crate::joint::quaternion::rotated_back;
+use crate::joint::quaternion::{quaternion_to_rotation, rotated_back};
 use crate::model::BodyId;
 use crate::real::Real;
 use crate::reduced::{ReducedBody, ReducedJoint, ReducedModel};
-use crate::spatial::Vec3;
+use crate::spatial::{Mat3, Vec3};
 use alloc::vec;
 use alloc::vec::Vec;
 
@@ -37,21 +37,23 @@ pub fn reduced_gravity_force_with_limbs<T: Real>(
     T::section("sines and cosines", None);
     let turn = |(i, body): (usize, &ReducedBody<T>)| match body.kind {
         ReducedJoint::Turn => own_angle(i, body, q),
-        ReducedJoint::Slide | ReducedJoint::Free => body.offset,
+        ReducedJoint::Slide | ReducedJoint::Free | ReducedJoint::Ball => body.offset,
     };
     let turns: Vec<(T, T)> = model.bodies.iter().enumerate().map(turn).collect();
+    let balls: Vec<Option<Mat3<T>>> = model.bodies.iter().map(|body| ball_rotation(body, q)).collect();
     for (i, body) in model.bodies.iter().enumerate() {
         T::section("forward", Some(i));
         let before = body.parent.map_or(-model.gravity, |p| up[p]);
         let (s, c) = turns[i];
         let at_joint = match body.kind {
-            ReducedJoint::Free => {
-                let k = body.iq + 3;
-                rotated_back([q[k], q[k + 1], q[k + 2], q[k + 3]], before)
-            }
+            ReducedJoint::Free => rotated_back(body.quaternion(q), before),
             _ => body.rotation.transpose_mul(before),
         };
-        let own = if body.kind == ReducedJoint::Free { at_joint } else { at_joint.turned(-s, c) };
+        let own = match (body.kind, &balls[i]) {
+            (ReducedJoint::Free, _) => at_joint,
+            (_, Some(ball)) => ball.transpose_mul(at_joint),
+            _ => at_joint.turned(-s, c),
+        };
         up.push(own.named("up", i));
         up_at_joint.push(at_joint);
     }
@@ -63,10 +65,18 @@ pub fn reduced_gravity_force_with_limbs<T: Real>(
         T::section("backward", Some(i));
         let s = first_moment[i].named("first_moment", i);
         let (sin, cos) = turns[i];
-        let (at_joint, g) = (s.turned(sin, cos), up_at_joint[i]);
+        let at_joint = match &balls[i] {
+            Some(ball) => *ball * s,
+            None => s.turned(sin, cos),
+        };
+        let g = up_at_joint[i];
         match body.kind {
             ReducedJoint::Turn => forces[body.iv] = at_joint.x * g.y - at_joint.y * g.x,
             ReducedJoint::Slide => forces[body.iv] = mass[i] * g.z,
+            // in own axes, as the joint's rates are
+            ReducedJoint::Ball => {
+                s.cross(up[i]).to_array().into_iter().enumerate().for_each(|(k, f)| forces[body.iv + k] = f);
+            }
             ReducedJoint::Free => {
                 let both = g.scale(mass[i]).scale(model.per_unit).to_array().into_iter().chain(s.cross(g).to_array());
                 both.enumerate().for_each(|(k, f)| forces[body.iv + k] = f);
@@ -88,4 +98,9 @@ pub fn reduced_gravity_force_with_limbs<T: Real>(
         }
     }
     forces
+}
+
+/// From the axes of a body on a ball joint to those of the joint.
+fn ball_rotation<T: Real>(body: &ReducedBody<T>, q: &[T]) -> Option<Mat3<T>> {
+    (body.kind == ReducedJoint::Ball).then(|| quaternion_to_rotation(body.quaternion(q)))
 }

@@ -29,7 +29,7 @@ pub fn reduced_mass_matrix<T: Real>(model: &ReducedModel<T>, q: &[T]) -> Vec<T> 
         T::section("composite", Some(b));
         let (iv, composite, turn) = (body.iv, composites[b].named(b), &turns[b]);
         // in base axes, which the joint has turned or slid from already
-        let (moved, column) = match body.kind {
+        let (moved, columns) = match body.kind {
             ReducedJoint::Free => {
                 let composite = in_metres(&composite, model.per_unit);
                 let own = &q[body.iq..body.iq + FLOATING_BASE.nq()];
@@ -43,7 +43,7 @@ pub fn reduced_mass_matrix<T: Real>(model: &ReducedModel<T>, q: &[T]) -> Vec<T> 
                 let ms = composite.first_moment;
                 let force = Vec3::new(T::zero(), T::zero(), composite.mass);
                 let moment = Vec3::new(ms.y, -ms.x, T::zero());
-                (composite.slid(q[body.iq]), ForceVector { moment, force })
+                (composite.slid(q[body.iq]), vec![ForceVector { moment, force }])
             }
             ReducedJoint::Turn => {
                 // f = z × m c,  n = J z = (−Σ_xz, −Σ_yz, Σ_xx + Σ_yy)
@@ -55,7 +55,20 @@ pub fn reduced_mass_matrix<T: Real>(model: &ReducedModel<T>, q: &[T]) -> Vec<T> 
                 };
                 let (ms, s) = (moved.first_moment, moved.second_moment);
                 let force = Vec3::new(-ms.y, ms.x, T::zero());
-                (moved, ForceVector { moment: Vec3::new(-s.xz, -s.yz, inertia), force })
+                (moved, vec![ForceVector { moment: Vec3::new(-s.xz, -s.yz, inertia), force }])
+            }
+            ReducedJoint::Ball => {
+                // f = e_k × m c,  n = J e_k in own axes, J = tr(Σ) 1 − Σ
+                let (ms, inertia) = (composite.first_moment, composite.second_moment.second_moment_to_inertia());
+                let columns = [0, 1, 2].map(|k| {
+                    let axis = Vec3::from(core::array::from_fn(|j| if j == k { T::one() } else { T::zero() }));
+                    ForceVector { moment: inertia * axis, force: axis.cross(ms) }
+                });
+                for (j, column) in columns.iter().enumerate() {
+                    let along = column.moment.to_array();
+                    (0..=j).for_each(|k| set(iv + j, iv + k, along[k]));
+                }
+                (composite, columns.to_vec())
             }
         };
         let arm_of = |b: usize| {
@@ -68,25 +81,27 @@ pub fn reduced_mass_matrix<T: Real>(model: &ReducedModel<T>, q: &[T]) -> Vec<T> 
         composites[parent] = composites[parent].plus(&placed);
 
         // to the base, projected on each joint that it passes
-        let (mut below, mut wrench) = (b, column);
-        while let Some(ancestor) = model.bodies[below].parent {
-            T::section("column", Some(b));
-            let (body, turn) = (&model.bodies[below], &turns[below]);
-            let force = turn.base_to_parent(body, wrench.force);
-            let moment = turn.base_to_parent(body, wrench.moment) + arm_of(below).cross(force);
-            let over = &model.bodies[ancestor];
-            along_joint(model, over, &ForceVector { moment, force }, &mut |k, x| set(iv, k, x));
-            let turned = |v| turns[ancestor].described_to_base(over, v);
-            let moment = match over.kind {
-                // q z × F
-                ReducedJoint::Slide => {
-                    let slide = q[over.iq];
-                    moment + Vec3::new(-(slide * force.y), slide * force.x, T::zero())
-                }
-                _ => moment,
-            };
-            wrench = ForceVector { moment: turned(moment), force: turned(force) };
-            below = ancestor;
+        for (iv, column) in (iv..).zip(columns) {
+            let (mut below, mut wrench) = (b, column);
+            while let Some(ancestor) = model.bodies[below].parent {
+                T::section("column", Some(b));
+                let (body, turn) = (&model.bodies[below], &turns[below]);
+                let force = turn.base_to_parent(body, wrench.force);
+                let moment = turn.base_to_parent(body, wrench.moment) + arm_of(below).cross(force);
+                let over = &model.bodies[ancestor];
+                along_joint(model, over, &ForceVector { moment, force }, &mut |k, x| set(iv, k, x));
+                let turned = |v| turns[ancestor].described_to_base(over, v);
+                let moment = match over.kind {
+                    // q z × F
+                    ReducedJoint::Slide => {
+                        let slide = q[over.iq];
+                        moment + Vec3::new(-(slide * force.y), slide * force.x, T::zero())
+                    }
+                    _ => moment,
+                };
+                wrench = ForceVector { moment: turned(moment), force: turned(force) };
+                below = ancestor;
+            }
         }
     }
     h
@@ -104,9 +119,10 @@ pub(super) fn of_body<T: Real>(body: &ReducedBody<T>, turn: &Turn<T>) -> Composi
 /// From base axes to those of the parent's description, about the parent's origin, p = arm before it.
 fn placed<T: Real>(composite: &Composite<T>, body: &ReducedBody<T>, turn: &Turn<T>, p: Vec3<T>) -> Composite<T> {
     let ms = turn.base_to_parent(body, composite.first_moment);
-    let s = match turn.continues {
-        true => composite.second_moment,
-        false => rotated(&body.rotation, composite.second_moment, body.permutes),
+    let s = match (&turn.free, turn.continues) {
+        (Some(r), _) => rotated(&body.rotation, rotated(r, composite.second_moment, false), body.permutes),
+        (None, true) => composite.second_moment,
+        (None, false) => rotated(&body.rotation, composite.second_moment, body.permutes),
     };
     Composite::moved(composite.mass, (ms, s), p)
 }

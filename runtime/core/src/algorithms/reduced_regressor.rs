@@ -67,12 +67,13 @@ impl<T: Real> PointField<T> {
     /// Of coordinate `row` of a joint, about its body's origin.
     fn new(sweep: &MotionSweep<'_, T>, (joint, row): (BodyId, usize)) -> Self {
         let zero = Vec3::zero();
-        match sweep.body(joint).kind {
+        let over = sweep.body(joint);
+        match over.kind {
             ReducedJoint::Turn => PointField { turn: Vec3::unit_z(), shift: zero },
             ReducedJoint::Slide => PointField { turn: zero, shift: Vec3::unit_z() },
-            ReducedJoint::Free => {
+            ReducedJoint::Free | ReducedJoint::Ball => {
                 let axis = core::array::from_fn(|k| if k == row % 3 { T::one() } else { T::zero() });
-                match row < 3 {
+                match over.kind == ReducedJoint::Free && row < 3 {
                     true => PointField { turn: zero, shift: Vec3::from(axis) },
                     false => PointField { turn: Vec3::from(axis), shift: zero },
                 }

@@ -23,8 +23,8 @@ pub(super) struct Turn<T> {
     pub continues: bool,
     /// The terms of the angle besides constant offsets, and sine and cosine of those, where angles are added.
     sum: (Vec<T>, (T, T)),
-    /// Rotation of a floating base.
-    free: Option<Mat3<T>>,
+    /// Rotation of a floating base or a ball joint, from the body's own axes, which are its base axes, to those of its joint.
+    pub free: Option<Mat3<T>>,
 }
 
 impl<T: Real> Turn<T> {
@@ -61,9 +61,8 @@ impl<T: Real> Turn<T> {
                     Turn { angle: Some(angle), turning, continues: continued.is_some(), sum, free: None }
                 }
                 ReducedJoint::Slide => Turn { angle: None, turning: None, continues: false, sum: none(), free: None },
-                ReducedJoint::Free => {
-                    let k = body.iq + 3;
-                    let rotation = quaternion_to_rotation([q[k], q[k + 1], q[k + 2], q[k + 3]]);
+                ReducedJoint::Free | ReducedJoint::Ball => {
+                    let rotation = quaternion_to_rotation(body.quaternion(q));
                     Turn { angle: None, turning: None, continues: false, sum: none(), free: Some(rotation) }
                 }
             };
@@ -75,7 +74,7 @@ impl<T: Real> Turn<T> {
     /// From the axes of the parent's description to the base axes.
     pub fn parent_to_base(&self, body: &ReducedBody<T>, v: Vec3<T>) -> Vec3<T> {
         match (&self.free, self.continues) {
-            (Some(r), _) => r.transpose_mul(v),
+            (Some(r), _) => r.transpose_mul(body.rotation.transpose_mul(v)),
             (None, true) => v,
             (None, false) => body.rotation.transpose_mul(v),
         }
@@ -84,7 +83,7 @@ impl<T: Real> Turn<T> {
     /// From the base axes to those of the parent's description.
     pub fn base_to_parent(&self, body: &ReducedBody<T>, v: Vec3<T>) -> Vec3<T> {
         match (&self.free, self.continues) {
-            (Some(r), _) => *r * v,
+            (Some(r), _) => body.rotation * (*r * v),
             (None, true) => v,
             (None, false) => body.rotation * v,
         }

@@ -137,6 +137,11 @@ impl JointKind {
         self.elementary() == Some(Measure::Length)
     }
 
+    /// Whether it turns about all axes and does nothing else: its coordinates are a quaternion alone.
+    pub fn turns_freely(self) -> bool {
+        self.row().quaternion == Some(0)
+    }
+
     /// What its configuration coordinates measure, those of a quaternion left out.
     pub fn measures(self) -> impl Iterator<Item = Measure> {
         let row = self.row();

@@ -27,6 +27,7 @@ impl<T: Real> Column<T> {
             ReducedJoint::Turn => Column::of_turn(sweep, i, subtree),
             ReducedJoint::Slide => Column::of_slide(sweep, i, subtree),
             ReducedJoint::Free => unreachable!("a floating base has columns of its own"),
+            ReducedJoint::Ball => unreachable!("robots with ball joints have no structured columns"),
         }
     }
 
@@ -106,7 +107,7 @@ impl<T: Real> Column<T> {
     pub fn own_rate(&self, kind: ReducedJoint) -> T {
         match kind {
             ReducedJoint::Turn => self.by_rate.moment.z,
-            ReducedJoint::Slide | ReducedJoint::Free => self.by_rate.force.z,
+            ReducedJoint::Slide | ReducedJoint::Free | ReducedJoint::Ball => self.by_rate.force.z,
         }
     }
 

@@ -49,6 +49,7 @@ impl<T: Real> Field<T> {
                 shift_second: second,
             },
             ReducedJoint::Free => unreachable!("a floating base has columns of its own"),
+            ReducedJoint::Ball => unreachable!("robots with ball joints have no structured columns"),
         }
     }
 

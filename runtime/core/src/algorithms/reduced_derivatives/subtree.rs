@@ -78,6 +78,7 @@ impl<T: Real> Subtree<T> {
                 spread = spread + Mat3 { rows: [[o; 3], [o; 3], [rate * h.x, rate * h.y, rate * h.z]] };
             }
             ReducedJoint::Free => unreachable!("a floating base has no parent"),
+            ReducedJoint::Ball => unreachable!("robots with ball joints have no structured columns"),
         }
         let first_moment = turn.base_to_parent(body, composite.first_moment);
         let drift = turn.base_to_parent(body, drift);
