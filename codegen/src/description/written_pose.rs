@@ -70,6 +70,18 @@ impl Rotation {
         Rotation::RollPitchYaw([Angle::zero(place.clone()), Angle::zero(place.clone()), Angle::zero(place)])
     }
 
+    /// Whether nothing turns, as it is written.
+    pub fn is_identity(&self) -> bool {
+        match self {
+            Rotation::RollPitchYaw(angles) => angles.iter().all(|angle| angle.value == 0.0),
+            Rotation::Turns(turns) => turns.iter().all(|turn| match turn {
+                WrittenTurn::About { angle, .. } => angle.value == 0.0,
+                WrittenTurn::Quaternion(q) => q.value[1..] == [0.0; 3],
+                _ => false,
+            }),
+        }
+    }
+
     pub(super) fn angles(&self, of: String) -> Vec<(String, &Angle)> {
         match self {
             Rotation::RollPitchYaw(rpy) => {
@@ -101,5 +113,10 @@ impl WrittenPose {
     /// Frames that coincide, where the file says nothing.
     pub fn identity(place: Place) -> WrittenPose {
         WrittenPose { xyz: Noted::new([0.0; 3], place.clone()), rotation: Rotation::identity(place) }
+    }
+
+    /// Whether frames coincide, as it is written.
+    pub fn is_identity(&self) -> bool {
+        self.xyz.value == [0.0; 3] && self.rotation.is_identity()
     }
 }

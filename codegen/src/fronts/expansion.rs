@@ -72,7 +72,7 @@ pub fn examine(
         Err((refusal, _)) => Some(refusal),
         Ok(opened) => {
             let found = compile::examine(&opened.robot, &opened.options(own));
-            files.extend(found.named_files().filter_map(|(file, _)| file.canonicalize().ok()));
+            files.extend(files_of(&found));
             found.has_errors().then(|| refusal(&found, &opened))
         }
     };
@@ -139,7 +139,7 @@ fn compiled(
     let (robot, options) = (&opened.robot, opened.options(own));
     let compiled = compile::compile(robot, &options);
     let said = compiled.as_ref().map_or_else(|diagnostics| diagnostics, |generated| &generated.warnings);
-    files.extend(said.named_files().filter_map(|(file, _)| file.canonicalize().ok()));
+    files.extend(files_of(said));
     let generated = compiled.map_err(|diagnostics| refusal(&diagnostics, opened))?;
     let associated = associated_items(&generated, &options.scene);
     Ok((generated.warnings.at_least(Severity::Warning).render(), generated, associated))
@@ -175,4 +175,9 @@ fn found(what: &str, name: &str, directories: &[&Path], files: &mut Vec<PathBuf>
     let source = Source::of_file(name, bytes, &file);
     files.push(file);
     Ok(source)
+}
+
+/// The files that were read on the way, each by its path from the root.
+fn files_of(said: &Diagnostics) -> impl Iterator<Item = PathBuf> + '_ {
+    said.named_files().filter_map(|(file, _)| file.canonicalize().ok())
 }

@@ -7,7 +7,7 @@ use super::files::Element;
 use super::{vocabulary, Mjcf};
 use crate::description::angle::{self, transform};
 use crate::description::geometry::compose;
-use crate::description::{BaseKind, NamedFrame, Noted, Rotation, WrittenJoint, WrittenLink, WrittenPose};
+use crate::description::{BaseKind, NamedFrame, Noted, WrittenJoint, WrittenLink, WrittenPose};
 use straightline_core::spatial::Transform;
 use straightline_core::Dd;
 
@@ -61,17 +61,13 @@ impl<'s> Contents<'s> {
         let mut next = content.frame;
         while let Some(frame) = next {
             let frame = &self.frames[frame];
-            if !is_identity(&frame.pose) {
+            if !frame.pose.is_identity() {
                 return true;
             }
             next = frame.around;
         }
         false
     }
-}
-
-fn is_identity(pose: &WrittenPose) -> bool {
-    pose.xyz.value == [0.0; 3] && pose.rotation == Rotation::Turns(Vec::new())
 }
 
 /// A body that is still to be read.
@@ -292,7 +288,7 @@ impl<'s> Mjcf<'s> {
             let FrameAround { element, pose, link: own, .. } = &contents.frames[frame];
             if let Some(own) = own {
                 link = own.clone();
-            } else if !is_identity(pose) {
+            } else if !pose.is_identity() {
                 let (element, pose) = (*element, pose.clone());
                 let is_named = element.attribute("name").is_some();
                 let name = self.name_of(element, &format!("{}_frame", contents.link.value));

@@ -1,12 +1,12 @@
 //! Chains of fixed joints, with links without mass between them.
 
-use super::poses::{is_identity, turns, PoseStep};
+use super::poses::{turns, PoseStep};
 use super::Sdf;
 use crate::description::{Angle, Noted, Rotation, WrittenJoint, WrittenLink, WrittenPose, WrittenTurn};
 
 /// Adds a pose to those before it: a turn alone joins the turn before it.
 pub(super) fn push(poses: &mut Vec<WrittenPose>, pose: WrittenPose) {
-    if is_identity(&pose) {
+    if pose.is_identity() {
         return;
     }
     match poses.last_mut().filter(|_| pose.xyz.value == [0.0; 3]) {

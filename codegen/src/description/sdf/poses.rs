@@ -36,7 +36,7 @@ impl PoseStep {
                 },
             ],
         };
-        poses.into_iter().filter(|pose| !is_identity(pose)).collect()
+        poses.into_iter().filter(|pose| !pose.is_identity()).collect()
     }
 
     /// The turn of it.
@@ -45,23 +45,6 @@ impl PoseStep {
         let rotation = if self.is_back { reversed(rotation) } else { rotation.clone() };
         WrittenPose { rotation, ..WrittenPose::identity(xyz.place.clone()) }
     }
-}
-
-/// Whether a rotation is none.
-fn is_none(rotation: &Rotation) -> bool {
-    match rotation {
-        Rotation::RollPitchYaw(angles) => angles.iter().all(|angle| angle.value == 0.0),
-        Rotation::Turns(turns) => turns.iter().all(|turn| match turn {
-            WrittenTurn::About { angle, .. } => angle.value == 0.0,
-            WrittenTurn::Quaternion(q) => q.value[1..] == [0.0; 3],
-            _ => false,
-        }),
-    }
-}
-
-/// Whether frames coincide.
-pub(super) fn is_identity(pose: &WrittenPose) -> bool {
-    pose.xyz.value == [0.0; 3] && is_none(&pose.rotation)
 }
 
 /// The turns of a rotation, one after the other: R = Rz(yaw) Ry(pitch) Rx(roll).

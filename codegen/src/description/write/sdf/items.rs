@@ -4,7 +4,6 @@ use super::is_limit;
 use crate::description::angle::{transform, ROUNDING};
 use crate::description::geometry::{compose, vector};
 use crate::description::reader::FreeNames;
-use crate::description::write::rotations::{self, Said};
 use crate::description::write::{pose_of, word_of, OnLinks};
 use crate::description::{
     AnchoredJoint, Description, Noted, Placement, WrittenCoupling, WrittenInertial, WrittenJoint, WrittenLink,
@@ -83,7 +82,7 @@ impl<'a> PosedOn<'a> {
 
     /// The pose that they are together: that of the file where the others are none.
     pub fn pose(&self) -> WrittenPose {
-        let mut moving = self.poses.iter().filter(|pose| !is_identity(pose));
+        let mut moving = self.poses.iter().filter(|pose| !pose.is_identity());
         match (moving.next(), moving.next()) {
             (None, _) => WrittenPose::identity(Place::none()),
             (Some(one), None) => (*one).clone(),
@@ -94,10 +93,6 @@ impl<'a> PosedOn<'a> {
 
 fn product(poses: &[&WrittenPose]) -> Transform<Dd> {
     poses.iter().fold(Transform::identity(), |before, pose| compose(&before, &transform(pose, ROUNDING)))
-}
-
-fn is_identity(pose: &WrittenPose) -> bool {
-    pose.xyz.value == [0.0; 3] && matches!(rotations::as_written(&pose.rotation), Said::Nothing)
 }
 
 /// Pose of the child in the parent's frame, and the joint and its axis in the child's frame.
@@ -252,7 +247,7 @@ impl<'a> ModelTree<'a> {
         };
         let (_, anchor, _) = parts_of(first)?;
         let (origin, own, _) = parts_of(second)?;
-        (moves(second) && is_identity(origin) && own == anchor).then_some(second)
+        (moves(second) && origin.is_identity() && own == anchor).then_some(second)
     }
 
     /// What a joint is in the format, with the next one where both are one.
@@ -303,7 +298,7 @@ impl<'a> ModelTree<'a> {
 /// The joint in the frame of its child, which stands behind it by fixed joints.
 fn place_in_child(anchor: [f64; 3], behind: &[&WrittenPose]) -> WrittenPose {
     let anchored = WrittenPose { xyz: Noted::assumed(anchor), ..WrittenPose::identity(Place::none()) };
-    match behind.iter().all(|pose| is_identity(pose)) {
+    match behind.iter().all(|pose| pose.is_identity()) {
         true => anchored,
         false => {
             let at_anchor = Transform { rotation: Mat3::identity(), translation: vector(anchor) };
