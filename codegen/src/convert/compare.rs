@@ -5,7 +5,7 @@ use crate::description::{self, Description, FileFormat};
 use crate::diagnostic::{Diagnostics, Severity, Source};
 use crate::model::{self, ModelOptions};
 use std::collections::HashSet;
-use straightline_core::closure::ClosedLoop;
+use straightline_core::closure::{ClosedLoop, Closure};
 use straightline_core::coupling::Coupling;
 use straightline_core::model::{Body, Frame, Model};
 use straightline_core::spatial::{SpatialInertia, Transform};
@@ -70,7 +70,7 @@ fn of_bodies_in_order(model: &Model<Dd>) -> Vec<Coupling<Dd>> {
     couplings
 }
 
-/// Whether the same points coincide, and determine the same joints.
+/// Whether the same points coincide, and determine the same joints in the same assemblies.
 fn are_loops(wanted: &Model<Dd>, found: &Model<Dd>, longest: f64) -> bool {
     let (a, b) = (&wanted.closure, &found.closure);
     let bodies = |model: &Model<Dd>| model.closure.dependents().collect::<HashSet<_>>();
@@ -78,7 +78,11 @@ fn are_loops(wanted: &Model<Dd>, found: &Model<Dd>, longest: f64) -> bool {
         let mut ends = a.ends.iter().zip(&b.ends);
         ends.all(|(a, b)| a.body == b.body && all_near(&a.point.to_array(), &b.point.to_array(), longest))
     };
-    a.loops.len() == b.loops.len() && bodies(wanted) == bodies(found) && a.loops.iter().zip(&b.loops).all(ends)
+    let ways = |closure: &Closure<Dd>| closure.groups.iter().map(|group| group.dyad.clone()).collect::<Vec<_>>();
+    a.loops.len() == b.loops.len()
+        && bodies(wanted) == bodies(found)
+        && ways(a) == ways(b)
+        && a.loops.iter().zip(&b.loops).all(ends)
 }
 
 fn magnitude(pose: &Transform<Dd>) -> f64 {

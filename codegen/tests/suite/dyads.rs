@@ -256,6 +256,32 @@ fn a_four_bar_stays_closed_wherever_its_crank_is() {
     }
 }
 
+/// However far the joints have to go: turns by nearly half a turn, starts in the other assembly.
+#[test]
+fn loops_close_from_wherever_their_joints_are() {
+    for (name, model) in robots() {
+        let model = model.cast::<f64>();
+        let home = &model.closure.home;
+        let mut random = Random(41);
+        let mut worst = (0.0, Vec::new());
+        for _ in 0..3000 {
+            let mut q = home.clone();
+            for b in model.closure.dependents() {
+                let joint = &model.bodies[b].joint;
+                let far = if joint.kind.slides() { 1.0 } else { 3.2 };
+                q[joint.iq] += random.symmetric(far);
+            }
+            let gaps = model.assemble_loops(&q, 5).1;
+            let gap = gaps.iter().fold(0.0, |most: f64, gap| most.max(gap.abs()));
+            if gap > worst.0 || gap.is_nan() {
+                worst = (gap, q);
+            }
+        }
+        println!("{name:24} {:.1e} m", worst.0);
+        assert!(worst.0 < 1e-14, "{name}: {} m from {:?}", worst.0, worst.1);
+    }
+}
+
 /// Each assembly is kept, also from its dead point.
 #[test]
 fn the_assembly_is_the_one_in_which_q_stands() {

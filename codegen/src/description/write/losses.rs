@@ -310,6 +310,18 @@ pub static SOFT_LOOPS: Loss = Loss {
     remove: |_| (),
 };
 
+/// Assemblies of loops by name.
+pub static ASSEMBLIES: Loss = Loss {
+    what: "assemblies of closed loops by name",
+    weight: Dynamics,
+    then: "each loop closes in the assembly in which its joints stand",
+    find: |robot| {
+        let named = robot.loops.iter().filter_map(|own| Some((own, own.assembly.as_ref()?)));
+        named.map(|(own, assembly)| (format!("loop `{}`", own.name.value), assembly.place.clone())).collect()
+    },
+    remove: |robot| robot.loops.iter_mut().for_each(|own| own.assembly = None),
+};
+
 /// Loops.
 pub static LOOPS: Loss = Loss {
     what: "closed loops",

@@ -25,6 +25,7 @@ pub static WRITER: FormatWriter = FormatWriter {
     losses: &[
         &losses::DRIVES,
         &losses::FLEXIBLE_LINKS,
+        &losses::ASSEMBLIES,
         &losses::VELOCITY_LIMITS,
         &losses::ONE_SIDED_RANGES,
         &losses::ZERO_EFFORTS,

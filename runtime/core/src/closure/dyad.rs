@@ -5,11 +5,11 @@
 //! (subproblems of Paden and Kahan; Murray, Li, Sastry 1994, section 3.2). For a hinge this is A cos δ + B sin δ = C, and
 //!
 //! ```text
-//! tan(δ/2) = (C − A)/(B ± √(A² + B² − C²))
+//! sin δ ~ B C − A S,   cos δ ~ A C + B S   with S = ±√(A² + B² − C²)
 //! ```
 //!
-//! with the sign of B: in the assembly where the joint stands, and without cancellation there. Four-bars, slider-cranks, cylinders, and rods with a universal joint are
-//! such loops.
+//! with the sign of B in the assembly where the joint stands, and the other one in the other. The angle comes from both, so that from wherever a joint stands
+//! it is off by some roundings of one radian at most. Four-bars, slider-cranks, cylinders, and rods with a universal joint are such loops.
 
 use super::{ClosedLoop, LoopGroup, Mechanism};
 use crate::algorithms::forward_kinematics;
@@ -46,8 +46,7 @@ impl DyadWay {
     /// The sign of B.
     fn sign<T: Real>(self, standing: T) -> T {
         match self {
-            // 1 at zero, too
-            DyadWay::AsItStands => (standing.sign() + standing.sign() + T::one()).sign(),
+            DyadWay::AsItStands => side_of(standing),
             DyadWay::Positive => T::one(),
             DyadWay::Negative => -T::one(),
         }
@@ -177,12 +176,12 @@ impl<T: Real> DyadPose<T> {
         self.crank.rotation.column(2).dot(moved - fixed)
     }
 
-    /// How far one that is a slide goes: δ² + 2 B δ + 2 C = 0.
+    /// How far one that is a slide goes: δ² + 2 B δ + 2 C = 0, δ = S − B.
     fn slide(&self, side: CrankSide, way: DyadWay) -> T {
         let (moved, fixed, square) = self.of_crank(side);
         let (apart, b) = (moved - fixed, self.sliding(side));
         let c = apart.dot(apart) - square;
-        -(c / (b + way.sign(b) * if_positive(b * b - c).sqrt()))
+        way.sign(b) * if_positive(b * b - c).sqrt() - b
     }
 
     /// By how much the last of two hinges turns: until the carried point is as far along the first one's axis as the one that it meets.
@@ -203,14 +202,29 @@ impl<T: Real> DyadPose<T> {
         let (carried, met) = (self.carried - self.centre, self.met - self.centre);
         let cos = carried.dot(met) - axis.dot(carried) * axis.dot(met);
         let sin = axis.dot(carried.cross(met));
-        twice_arc_tangent(sin / (cos + (cos * cos + sin * sin).sqrt()))
+        angle_of(sin, cos)
     }
 }
 
 /// δ of A cos δ + B sin δ = A + `more`. Where nothing solves it, δ stays finite.
 fn turn_to<T: Real>(a: T, b: T, more: T, way: DyadWay) -> T {
+    // A² + B² − C², without the difference of squares of which A is the greater part of both
     let square = b * b - more * (more + a + a);
-    twice_arc_tangent(more / (b + way.sign(b) * if_positive(square).sqrt()))
+    let (c, s) = (a + more, way.sign(b) * if_positive(square).sqrt());
+    angle_of(b * c - a * s, a * c + b * s)
+}
+
+/// 1, or −1 below zero.
+fn side_of<T: Real>(x: T) -> T {
+    (x.sign() + x.sign() + T::one()).sign()
+}
+
+/// The angle of a direction: tan(δ/2) = sin/(1 + cos) on the side where cos is positive, where that does not cancel, and π less it on the other.
+fn angle_of<T: Real>(sin: T, cos: T) -> T {
+    let side = side_of(cos);
+    let acute = twice_arc_tangent(sin / (side * cos + (cos * cos + sin * sin).sqrt()));
+    let straight = (T::one() - side) * side_of(sin) * T::constant(Dd::PI * Dd::HALF);
+    side * acute + straight
 }
 
 /// The number, or 0 in place of a negative one.
@@ -218,8 +232,8 @@ fn if_positive<T: Real>(x: T) -> T {
     x * (T::one() + x.sign()) * T::constant(Dd::HALF)
 }
 
-/// So often an angle is halved before its series: its tangent is then at most tan π/16.
-const HALVINGS: i32 = 3;
+/// So often an angle is halved before its series: its tangent, 1 at most, is then at most tan π/16.
+const HALVINGS: i32 = 2;
 /// Terms of the series: the next one would be 3e-20 of the first.
 const TERMS: u32 = 13;
 
