@@ -112,15 +112,25 @@ fn a_default_that_is_wrong_is_complained_of_once() {
 fn what_the_dynamics_do_not_need_is_listed() {
     let text = PLAIN.replace(
         "</worldbody>",
-        "<light/><camera/><camera/></worldbody><sensor><gyro/></sensor><contact/><keyframe/><visual/><tendon><spatial/></tendon>
+        "<body name=\"swings\"><joint type=\"ball\" range=\"0 60\"/><geom size=\"0.1\"/></body>
+         <light/><camera/><camera/></worldbody><sensor><gyro/></sensor><contact/><keyframe/><visual/><tendon><spatial/></tendon>
          <actuator><adhesion body=\"a\"/></actuator>",
     );
     let mut diagnostics = Diagnostics::new();
     let description = description::read(&Source::new("robot.xml", text), &mut diagnostics).expect("it is read");
     assert!(diagnostics.is_empty(), "{diagnostics}");
     let ignored: Vec<(&str, usize)> = description.ignored.iter().map(|i| (i.what.as_str(), i.count)).collect();
-    let expected =
-        ["light", "camera", "spatial tendon", "actuator adhesion", "sensor", "contact", "keyframe", "visual"];
+    let expected = [
+        "light",
+        "camera",
+        "range of a ball joint",
+        "spatial tendon",
+        "actuator adhesion",
+        "sensor",
+        "contact",
+        "keyframe",
+        "visual",
+    ];
     assert_eq!(ignored, expected.map(|what| (what, if what == "camera" { 2 } else { 1 })));
 }
 

@@ -131,6 +131,9 @@ impl<'s> Mjcf<'s> {
                 let help = "remove it, or write three hinges in its place";
                 self.refuse_number(given, name, &owner, "it would act on a joint with several coordinates", help);
             }
+            if self.is_limited(given, "limited", "range") {
+                self.ignore_as("range of a ball joint", given.element);
+            }
             let axis = Noted::new([0.0, 0.0, 1.0], name.place.clone());
             let placement = Placement::Anchored(AnchoredJoint { origin, anchor, axis, reference: None });
             let drive = JointDrive {

@@ -12,6 +12,10 @@ use crate::diagnostic::Place;
 use std::collections::{HashMap, HashSet};
 use straightline_core::Dd;
 
+mod loops;
+
+pub use loops::{ASSEMBLIES, LOOPS, SOFT_LOOPS};
+
 /// So much more than the sum of the others a principal moment is by rounding.
 const SLACK: f64 = 1.0 + 1e-12;
 
@@ -301,36 +305,6 @@ pub static SOFT_COUPLINGS: Loss = Loss {
     remove: |_| (),
 };
 
-/// Loops, which another program may hold only about.
-pub static SOFT_LOOPS: Loss = Loss {
-    what: "closed loops",
-    weight: Form,
-    then: "`equality/connect` is written, exact here and a soft constraint in MuJoCo itself, and motors at the independent joints",
-    find: loops,
-    remove: |_| (),
-};
-
-/// Assemblies of loops by name.
-pub static ASSEMBLIES: Loss = Loss {
-    what: "assemblies of closed loops by name",
-    weight: Dynamics,
-    then: "each loop closes in the assembly in which its joints stand",
-    find: |robot| {
-        let named = robot.loops.iter().filter_map(|own| Some((own, own.assembly.as_ref()?)));
-        named.map(|(own, assembly)| (format!("loop `{}`", own.name.value), assembly.place.clone())).collect()
-    },
-    remove: |robot| robot.loops.iter_mut().for_each(|own| own.assembly = None),
-};
-
-/// Loops.
-pub static LOOPS: Loss = Loss {
-    what: "closed loops",
-    weight: Dynamics,
-    then: "the robot is the tree that is left where they are cut",
-    find: loops,
-    remove: |robot| robot.loops.clear(),
-};
-
 /// Ball joints.
 pub static BALL_JOINTS: Loss = Loss {
     what: "ball joints",
@@ -446,10 +420,6 @@ fn inertias(robot: &Description, is_of_none: impl Fn(f64, [f64; 3], bool) -> boo
         Some((of_link(&link.name).0, place))
     };
     robot.links.iter().filter_map(of).collect()
-}
-
-fn loops(robot: &Description) -> Vec<(String, Place)> {
-    robot.loops.iter().map(|own| (format!("loop `{}`", own.name.value), own.name.place.clone())).collect()
 }
 
 /// Joints of which something stands somewhere.
