@@ -1,0 +1,142 @@
+//! All functions of robots of all kinds: machine code, interpreter and graph have the same bits.
+
+use straightline_codegen::compile::compile_programs;
+use straightline_codegen::diagnostic::Source;
+use straightline_codegen::model::{load, ModelOptions};
+use straightline_codegen::options::Options;
+use straightline_codegen::Function;
+use straightline_core::random::Random;
+use straightline_graph::expr::evaluate;
+use straightline_jit::{Execution, Layout, Number, Robot};
+
+type TestRobot = (&'static str, &'static str, bool);
+
+const ROBOTS: [TestRobot; 4] = [
+    ("ur5.urdf", include_str!("../../../generated_tests/count_robots/ur5.urdf"), false),
+    ("solo12.urdf", include_str!("../../../generated_tests/count_robots/solo12.urdf"), true),
+    ("fourbar.toml", include_str!("../../../codegen/tests/files/fourbar.toml"), false),
+    ("ball_chain.toml", include_str!("../../../codegen/tests/files/ball_chain.toml"), false),
+];
+
+/// A number as it is made for tests, and as it is compared.
+trait TestNumber: Number {
+    fn of(x: f64) -> Self;
+    fn is_nan(self) -> bool;
+}
+
+impl TestNumber for f64 {
+    fn of(x: f64) -> f64 {
+        x
+    }
+    fn is_nan(self) -> bool {
+        f64::is_nan(self)
+    }
+}
+
+impl TestNumber for f32 {
+    fn of(x: f64) -> f32 {
+        x as f32
+    }
+    fn is_nan(self) -> bool {
+        f32::is_nan(self)
+    }
+}
+
+/// Some number, now and then one at the end of what there is.
+fn any<T: TestNumber>(random: &mut Random) -> T {
+    const ENDS: [f64; 8] = [0.0, -0.0, 5e-324, -1e-310, 1e-40, f64::INFINITY, f64::NAN, 1e300];
+    match random.unit() {
+        x if x < 0.03 => T::of(ENDS[((random.unit() * 8.0) as usize).min(7)]),
+        _ => T::of(random.symmetric(3.0)),
+    }
+}
+
+fn are_same<T: TestNumber>(found: &[T], wanted: &[T], what: &str) {
+    assert_eq!(found.len(), wanted.len(), "{what}");
+    for (k, (found, wanted)) in found.iter().zip(wanted).enumerate() {
+        let is_same = found.bits() == wanted.bits() || found.is_nan() && wanted.is_nan();
+        assert!(is_same, "{what}, {k}: {found:?}, not {wanted:?}");
+    }
+}
+
+/// The results of one robot's functions in so many states: as batches, and the last of them one by one.
+fn same_bits<T: TestNumber>((name, text, floating_base): (&str, &str, bool), functions: &[Function], states: usize) {
+    let model = ModelOptions { floating_base, ..ModelOptions::default() };
+    let options = Options { model, functions: functions.to_vec(), scalar: T::SCALAR, ..Options::default() };
+    let source = Source::new(name, text);
+    let compiled = compile_programs(&source, &options).unwrap_or_else(|e| panic!("{}", e.render()));
+    let robots = [Execution::Avx, Execution::Interpreted]
+        .map(|execution| Robot::<T>::load_to_run(&source, &options, execution).unwrap_or_else(|e| panic!("{e}")));
+    let mut random = Random(17);
+    for (k, program) in compiled.programs.iter().enumerate() {
+        let lengths =
+            [&program.graph.inputs, &program.graph.outputs].map(|p| p.iter().map(|p| p.len()).collect::<Vec<_>>());
+        let some = |n: &usize, random: &mut Random| (0..n * states).map(|_| any(random)).collect();
+        let values: Vec<Vec<T>> = lengths[0].iter().map(|n| some(n, &mut random)).collect();
+        let state = |i: usize| values.iter().zip(&lengths[0]).map(move |(x, n)| &x[i * n..][..*n]).collect::<Vec<_>>();
+        let wanted: Vec<Vec<T>> = (0..states).map(|i| evaluate(&program.graph, &state(i).concat())).collect();
+        for robot in &robots {
+            let function = &robot.functions()[k];
+            let what = format!("{name}, {} in {:?}, {:?}", function.name(), T::SCALAR, function.execution());
+            let rows = |n: &usize| Layout::states_of(*n);
+            let mut found: Vec<Vec<T>> = lengths[1].iter().map(|n| vec![T::default(); n * states]).collect();
+            let taken: Vec<(&[T], Layout)> = values.iter().zip(&lengths[0]).map(|(x, n)| (&x[..], rows(n))).collect();
+            let mut made: Vec<(&mut [T], Layout)> =
+                found.iter_mut().zip(&lengths[1]).map(|(x, n)| (&mut x[..], rows(n))).collect();
+            function.batch(states, &taken, &mut made).unwrap_or_else(|e| panic!("{what}: {e}"));
+            for (i, wanted) in wanted.iter().enumerate() {
+                let own: Vec<&[T]> = found.iter().zip(&lengths[1]).map(|(x, n)| &x[i * n..][..*n]).collect();
+                are_same(&own.concat(), wanted, &format!("{what}, state {i}"));
+            }
+            let mut runner = function.runner();
+            for i in (0..states).rev().take(9) {
+                let mut one: Vec<Vec<T>> = lengths[1].iter().map(|n| vec![T::default(); *n]).collect();
+                let mut results: Vec<&mut [T]> = one.iter_mut().map(|x| &mut x[..]).collect();
+                runner.call(&state(i), &mut results).unwrap_or_else(|e| panic!("{what}: {e}"));
+                are_same(&one.concat(), &wanted[i], &format!("{what}, state {i} alone"));
+            }
+        }
+    }
+}
+
+const DYNAMICS: [Function; 5] = [
+    Function::InverseDynamics,
+    Function::ForwardDynamics,
+    Function::MassMatrix,
+    Function::ForwardKinematics,
+    Function::Energy,
+];
+
+#[test]
+fn dynamics_have_the_bits_of_their_programs() {
+    for robot in ROBOTS {
+        same_bits::<f64>(robot, &DYNAMICS, 50);
+        same_bits::<f32>(robot, &DYNAMICS[..2], 50);
+    }
+}
+
+/// Angles that are computed, and signs: more than one phase.
+#[test]
+fn functions_with_calls_in_between_have_them_too() {
+    let named = |name: &str| Function::known().find(|f| f.name() == name).expect("there is such a function");
+    let [ur5, solo, fourbar, balls] = ROBOTS;
+    same_bits::<f64>(fourbar, &[named("close_loops"), named("loop_jacobian")], 50);
+    let steps = [named("integrate"), named("semi_implicit_step")];
+    same_bits::<f64>(solo, &steps, 20);
+    same_bits::<f64>(balls, &steps, 20);
+    let rubbing = ur5.1.replacen("</joint>", "<dynamics friction=\"0.3\" damping=\"0.1\"/></joint>", 3);
+    same_bits::<f64>(("rubbing.urdf", &rubbing, false), &DYNAMICS[..2], 50);
+}
+
+#[test]
+#[ignore = "slow proof: every function of four robots"]
+fn slow_proof_that_every_function_has_the_bits_of_its_program() {
+    for robot in ROBOTS {
+        let options = ModelOptions { floating_base: robot.2, ..ModelOptions::default() };
+        let model = load(&Source::new(robot.0, robot.1), &options).0.expect("it is a robot");
+        let is_there = |f: &Function| f.is_of(&model) && !f.is_of_scene_parameters() && f.spec().members.is_empty();
+        let all: Vec<Function> = Function::all().filter(is_there).collect();
+        same_bits::<f64>(robot, &all, 50);
+        same_bits::<f32>(robot, &all, 10);
+    }
+}
