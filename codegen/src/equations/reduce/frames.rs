@@ -24,7 +24,7 @@ pub(super) fn choose_frames(model: &Model<Dd>, lever: f64, choice: &FreeTerms) -
     let mut chosen = vec![Transform::identity(); n];
     for i in (0..n).rev() {
         let body = &model.bodies[i];
-        if body.joint.kind.is_base() || body.joint.kind.turns_freely() {
+        if keeps_frame(body) {
             continue;
         }
         chosen[i] = match primary(i) {
@@ -55,6 +55,11 @@ pub(super) fn choose_frames(model: &Model<Dd>, lever: f64, choice: &FreeTerms) -
         }
     }
     chosen
+}
+
+/// Whether a body keeps its frame, as its joint has no axis but rates along those of the body.
+fn keeps_frame(body: &Body<Dd>) -> bool {
+    body.joint.kind.is_base() || body.joint.kind.turns_freely()
 }
 
 /// How high on its axis a revolute body has the foot of the common normal with the axis of a revolute joint before it.
@@ -107,8 +112,7 @@ pub(super) fn tip_frame(model: &Model<Dd>, body: &Body<Dd>, lever: f64) -> Trans
     let (r, p) = (body.placement.rotation, body.placement.translation);
     let u = r.column(2);
     let sine2 = u.x * u.x + u.y * u.y;
-    let has_axis = |p: BodyId| !(model.bodies[p].joint.kind.is_base() || model.bodies[p].joint.kind.turns_freely());
-    if !body.parent.is_some_and(has_axis) {
+    if body.parent.is_none_or(|p| keeps_frame(&model.bodies[p])) {
         return Transform::identity();
     }
     if sine2.hi() > NEARLY_PARALLEL * NEARLY_PARALLEL {

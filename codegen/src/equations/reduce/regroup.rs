@@ -3,7 +3,8 @@
 use super::*;
 
 /// Moves what a joint's torque cannot tell from the parent's to the parent (Khalil and Dombre 2002, chapter 9, in second
-/// moments): what lies on a revolute axis; of a sliding body all of the second moment.
+/// moments): what lies on a revolute axis; of a sliding body all of the second moment; of a body on a ball joint all of the
+/// mass.
 ///
 /// Any part of it may stay: where `vanish` says so, as much is moved as makes that component of the parent vanish; where
 /// `balances` says so, as much as leaves Σ_zz = −Σ_xx or −Σ_yy.
@@ -15,11 +16,16 @@ pub(super) fn regroup(
     balances: [bool; 2],
 ) {
     let body = bodies[i].clone();
-    let zero = Dd::ZERO;
     let (rotation, a, p) = (body.rotation, body.rotation.column(2), body.translation);
     match body.kind {
         ReducedJoint::Free => {}
-        ReducedJoint::Ball => regroup_mass(bodies, i),
+        // the joint holds its origin whatever the body does
+        ReducedJoint::Ball => {
+            bodies[i].mass = Dd::ZERO;
+            if let Some(parent) = body.parent {
+                hand_on(&mut bodies[parent], [p, a], [body.mass, Dd::ZERO, Dd::ZERO]);
+            }
+        }
         ReducedJoint::Turn => {
             let (mut m, mut mz, mut szz) = (body.mass, body.first_moment.z, body.second_moment.zz);
             if let Some(before) = body.parent.map(|p| &bodies[p]) {
@@ -49,23 +55,7 @@ pub(super) fn regroup(
             own.first_moment.z = body.first_moment.z - mz;
             own.second_moment.zz = body.second_moment.zz - szz;
             match body.parent {
-                Some(parent) => {
-                    let parent = &mut bodies[parent];
-                    let mass = parent.mass + m;
-                    parent.mass = mass;
-                    parent.first_moment = parent.first_moment + p.scale(m) + a.scale(mz);
-                    let cross = symmetric_product(p, a);
-                    let moved = scaled(symmetric_square(p), m) + scaled(cross, mz) + scaled(symmetric_square(a), szz);
-                    parent.second_moment = parent.second_moment + moved;
-                    // what vanishes does so exactly
-                    let dust = |x: Dd, scale: Dd| if x.abs().hi() <= DUST * scale.abs().hi() { zero } else { x };
-                    let ms = parent.first_moment;
-                    let (x, y, z) = (p.x * m, p.y * m + a.y * mz, p.z * m + a.z * mz);
-                    parent.first_moment = Vec3::new(dust(ms.x, x), dust(ms.y, y), dust(ms.z, z));
-                    let s = parent.second_moment;
-                    let (xx, yy, zz) = (dust(s.xx, moved.xx), dust(s.yy, moved.yy), dust(s.zz, moved.zz));
-                    parent.second_moment = Sym3 { xx, yy, zz, ..s };
-                }
+                Some(parent) => hand_on(&mut bodies[parent], [p, a], [m, mz, szz]),
                 None => {
                     // turns about a fixed axis: one moment of inertia
                     let s = own.second_moment;
@@ -86,16 +76,22 @@ pub(super) fn regroup(
     }
 }
 
-/// All of the mass of a body on a ball joint, which holds its origin whatever the body does.
-fn regroup_mass(bodies: &mut [ReducedBody<Dd>], i: usize) {
-    let ReducedBody { mass: m, translation: p, parent, .. } = bodies[i];
-    bodies[i].mass = Dd::ZERO;
-    if let Some(parent) = parent.map(|p| &mut bodies[p]) {
-        let mass = parent.mass + m;
-        parent.mass = mass;
-        parent.first_moment = parent.first_moment + p.scale(m);
-        parent.second_moment = parent.second_moment + scaled(symmetric_square(p), m);
-    }
+/// Adds a mass m at p, with a first moment and a second moment along the axis a, to a body.
+fn hand_on(to: &mut ReducedBody<Dd>, [p, a]: [Vec3<Dd>; 2], [m, mz, szz]: [Dd; 3]) {
+    let mass = to.mass + m;
+    to.mass = mass;
+    to.first_moment = to.first_moment + p.scale(m) + a.scale(mz);
+    let cross = symmetric_product(p, a);
+    let moved = scaled(symmetric_square(p), m) + scaled(cross, mz) + scaled(symmetric_square(a), szz);
+    to.second_moment = to.second_moment + moved;
+    // what vanishes does so exactly
+    let dust = |x: Dd, scale: Dd| if x.abs().hi() <= DUST * scale.abs().hi() { Dd::ZERO } else { x };
+    let ms = to.first_moment;
+    let (x, y, z) = (p.x * m, p.y * m + a.y * mz, p.z * m + a.z * mz);
+    to.first_moment = Vec3::new(dust(ms.x, x), dust(ms.y, y), dust(ms.z, z));
+    let s = to.second_moment;
+    let (xx, yy, zz) = (dust(s.xx, moved.xx), dust(s.yy, moved.yy), dust(s.zz, moved.zz));
+    to.second_moment = Sym3 { xx, yy, zz, ..s };
 }
 
 fn scaled(s: Sym3<Dd>, k: Dd) -> Sym3<Dd> {
