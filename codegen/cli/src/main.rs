@@ -194,9 +194,9 @@ fn verify(a: &Verify) -> Result<(), CommandFailure> {
     progress.finish_and_clear();
     let verification = verified.map_err(|what| print::failure(format!("{}: {what}", source.path())))?;
     if a.json { print::json(&verification) } else { print::verification(&verification) }?;
-    match verification.passes() {
-        true => Ok(()),
-        false => Err(print::failure(format!("an error exceeds the bound {:.1e}", verification.bound))),
+    match verification.failure() {
+        None => Ok(()),
+        Some(why) => Err(print::failure(why)),
     }
 }
 

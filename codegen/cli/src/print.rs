@@ -130,16 +130,23 @@ pub fn codes(codes: &[Code]) -> io::Result<()> {
     Ok(())
 }
 
+/// How wide the column of these names is, with the space behind it.
+fn name_width(names: impl IntoIterator<Item = impl AsRef<str>>) -> usize {
+    let longest = names.into_iter().map(|name| name.as_ref().chars().count()).max().unwrap_or(0);
+    20.max(longest + 2)
+}
+
 /// The functions that a word is about, or all of them.
 pub fn functions(word: Option<&str>) -> io::Result<()> {
     let mut out = stdout().lock();
     let mut found: Vec<Function> = Function::known().filter(|f| word.is_none_or(|word| f.is_about(word))).collect();
     // `COM` is a name of the centre of mass, and the beginning of computed torque
     found.sort_by_key(|f| !word.is_some_and(|word| f.is_called(word)));
+    let width = name_width(found.iter().map(|function| function.name()));
     for function in &found {
-        writeln!(out, "{:<30}{}", function.name(), function.summary())?;
+        writeln!(out, "{:<width$}{}", function.name(), function.summary())?;
         if !function.aliases().is_empty() {
-            writeln!(out, "{:<30}also: {}", "", function.aliases().join(", "))?;
+            writeln!(out, "{:<width$}also: {}", "", function.aliases().join(", "))?;
         }
     }
     if found.is_empty() {
@@ -221,15 +228,16 @@ pub fn report(report: &Report) -> io::Result<()> {
     let mut out = stdout().lock();
     let Report { robot, nq, nv, scalar, functions, .. } = report;
     writeln!(out, "{robot}: nq {nq}, nv {nv}, {scalar}\n")?;
+    let width = name_width(functions.keys());
     writeln!(
         out,
-        "{:<20}{:>8}{:>8}{:>8}{:>6}{:>6}{:>8}{:>6}{:>6}{:>7}{:>8}",
+        "{:<width$}{:>8}{:>8}{:>8}{:>6}{:>6}{:>8}{:>6}{:>6}{:>7}{:>8}",
         "function", "mul", "add", "fma", "div", "sqrt", "sincos", "tail", "live", "parts", "lines"
     )?;
     for (name, f) in functions {
         writeln!(
             out,
-            "{name:<20}{:>8}{:>8}{:>8}{:>6}{:>6}{:>8}{:>6}{:>6}{:>7}{:>8}",
+            "{name:<width$}{:>8}{:>8}{:>8}{:>6}{:>6}{:>8}{:>6}{:>6}{:>7}{:>8}",
             f.mul, f.add, f.fma, f.div, f.sqrt, f.sincos, f.tail, f.max_live, f.parts, f.lines
         )?;
     }
@@ -240,17 +248,18 @@ pub fn report(report: &Report) -> io::Result<()> {
         writeln!(out, "{start}{name:<40}{mul:>8}{add:>8}{fma:>8}{div:>6}{sqrt:>6}{sin_cos:>8}")?;
     }
     if let Some(staged) = &report.staged {
+        let [of_stage, of_rest] = ["stage ", "then "].map(|word| width - word.len());
         writeln!(out)?;
         for s in &staged.stages {
             let StageReport { name, mul, add, div, sqrt, sincos, stored } = s;
             writeln!(
                 out,
-                "stage {name:<14}{mul:>8}{add:>8}{:>8}{div:>6}{sqrt:>6}{sincos:>8}, stores {stored} values",
+                "stage {name:<of_stage$}{mul:>8}{add:>8}{:>8}{div:>6}{sqrt:>6}{sincos:>8}, stores {stored} values",
                 ""
             )?;
         }
         for (name, Remaining { mul, add, div, sqrt }) in &staged.remaining {
-            writeln!(out, "then {name:<15}{mul:>8}{add:>8}{:>8}{div:>6}{sqrt:>6}", "")?;
+            writeln!(out, "then {name:<of_rest$}{mul:>8}{add:>8}{:>8}{div:>6}{sqrt:>6}", "")?;
         }
         let stored = [("inverse", staged.inverse_dynamics), ("forward", staged.forward_dynamics)];
         for (what, stored) in stored.into_iter().filter_map(|(what, stored)| Some((what, stored?))) {
@@ -301,10 +310,11 @@ pub fn report(report: &Report) -> io::Result<()> {
 pub fn verification(v: &Verification) -> io::Result<()> {
     let mut out = stdout().lock();
     writeln!(out, "{}: {} against the reference, {} states, seed {}\n", v.robot, v.scalar, v.states, v.seed)?;
-    writeln!(out, "{:<20}{:>14}{:>8}   worst in", "function", "worst error", "state")?;
+    let width = name_width(v.functions.keys());
+    writeln!(out, "{:<width$}{:>14}{:>8}   worst in", "function", "worst error", "state")?;
     for (name, f) in &v.functions {
         let (style, mark) = if f.error <= v.bound { (Style::new(), "") } else { (ERROR, "  exceeds the bound") };
-        writeln!(out, "{name:<20}{style}{:>14.2e}{style:#}{:>8}   {}{mark}", f.error, f.state, f.output)?;
+        writeln!(out, "{name:<width$}{style}{:>14.2e}{style:#}{:>8}   {}{mark}", f.error, f.state, f.output)?;
     }
     for (name, f) in v.functions.iter().filter(|(_, f)| f.error > v.bound) {
         writeln!(out, "\n{name}, state {}:", f.state)?;

@@ -5,13 +5,12 @@
 //! o and k of the joint.
 
 use super::{Extent, Function};
+use crate::identifier;
 use std::fmt::Write;
-use straightline_core::base_parameters::{BaseParameter, PER_BODY};
+use straightline_core::base_parameters::{BaseParameter, JointParameter, PER_BODY};
 use straightline_core::model::Model;
 use straightline_core::Dd;
 
-/// So many terms of a name are written out, the greatest ones; of the others their number is said.
-const TERMS: usize = 12;
 /// Of the ten parameters of a link.
 const SYMBOLS: [&str; PER_BODY] = ["m", "mx", "my", "mz", "Ixx", "Ixy", "Ixz", "Iyy", "Iyz", "Izz"];
 
@@ -25,6 +24,8 @@ pub struct BaseParameterList {
     pub names: Vec<String>,
     /// Their values for the robot, without what a scene makes an input.
     pub values: Vec<f64>,
+    /// What joints add to forces without a column: a sentence behind others, with the names of the joints; empty where there is nothing.
+    pub left_out: String,
     /// Rows and columns of the entries of the regressor that are not zero everywhere, column by column.
     pub places: Vec<[usize; 2]>,
 }
@@ -37,13 +38,15 @@ pub fn base_parameter_lists(model: &Model<Dd>, functions: &[Function]) -> Vec<Ba
         what,
         names: parameters.iter().map(|parameter| name(model, parameter)).collect(),
         values: parameters.iter().map(|parameter| parameter.value(&of).to_f64()).collect(),
+        left_out: String::new(),
         places: parameters.iter().enumerate().flat_map(|(k, p)| p.rows.iter().map(move |row| [*row, k])).collect(),
     };
     let is_wanted = |extents: &[Extent]| functions.iter().any(|f| extents.iter().any(|extent| f.has_axis(*extent)));
     let base = &model.base_parameters;
     let mut lists = Vec::new();
     if is_wanted(&[Extent::BaseParameters, Extent::RegressorEntries]) {
-        lists.push(list("BASE", "generalized forces", &base.of_forces));
+        let left_out = left_out(model);
+        lists.push(BaseParameterList { left_out, ..list("BASE", "generalized forces", &base.of_forces) });
     }
     if is_wanted(&[Extent::SupportParameters]) {
         lists.push(list("SUPPORT", "the wrench on the support", &base.of_support));
@@ -68,7 +71,7 @@ fn name(model: &Model<Dd>, parameter: &BaseParameter) -> String {
     };
     terms.sort_by(order);
     let mut out = String::new();
-    for (k, (_, factor, symbol)) in terms.iter().take(TERMS).enumerate() {
+    for (k, (_, factor, symbol)) in terms.iter().enumerate() {
         let sign = match (k, *factor < 0.0) {
             (0, false) => "",
             (0, true) => "-",
@@ -81,10 +84,29 @@ fn name(model: &Model<Dd>, parameter: &BaseParameter) -> String {
             false => write!(out, "{sign}{}*{symbol}", four_digits(size)),
         };
     }
-    if terms.len() > TERMS {
-        let _ = write!(out, " + {} more", terms.len() - TERMS);
-    }
     out
+}
+
+/// What joints add to generalized forces without a column.
+fn left_out(model: &Model<Dd>) -> String {
+    let mut bodies: Vec<_> = model.bodies.iter().collect();
+    bodies.sort_by_key(|body| body.joint.iv);
+    let columns = &model.base_parameters.joint_parameters;
+    let kinds = JointParameter::EVERY.into_iter().filter(|kind| !columns.contains(kind));
+    let of_kinds: Vec<String> = kinds
+        .filter_map(|kind| {
+            let with = bodies.iter().filter(|body| kind.value(&body.effects).to_f64() != 0.0);
+            let joints: Vec<String> = with.map(|body| identifier::doc(&body.joint.name)).collect();
+            (!joints.is_empty()).then(|| format!("`{}` of {}", kind.word(), joints.join(", ")))
+        })
+        .collect();
+    match of_kinds.is_empty() {
+        true => String::new(),
+        false => {
+            let all = of_kinds.join("; ");
+            format!(" Y β is without what has no column: {all}. `[regressor]` in a scene gives it columns.")
+        }
+    }
 }
 
 /// A factor to four digits.

@@ -43,7 +43,7 @@ pub struct TorqueRegressor;
 impl RobotFunction for TorqueRegressor {
     const SPEC: Spec = Spec {
         name: "torque_regressor",
-        summary: "The regressor Y(q, q̇, q̈) of inverse dynamics: τ = Y β with the base parameters β.",
+        summary: "The regressor Y(q, q̇, q̈) of inverse dynamics: τ = Y β with the base parameters β, but for what joints add without a column.",
         aliases: &["computeJointTorqueRegressor", "identification matrix", "dynamic parameters", "adaptive control"],
         inputs: &[Quantity::Configuration, Quantity::Velocity, Quantity::Acceleration],
         outputs: &[Output::new(

@@ -66,14 +66,29 @@ pub struct Verification {
     pub bound: f64,
     /// The worst error of every function.
     pub functions: BTreeMap<&'static str, Worst>,
-    /// Functions of drives that the reference has no formulation of: tests of their own hold them to laws of physics.
+    /// Functions that the reference has no formulation of: tests of their own hold them to laws of physics.
     pub left_out: Vec<&'static str>,
 }
 
 impl Verification {
-    /// Whether all errors are within the bound.
+    /// Why it is no proof: nothing was compared, or an error exceeds the bound.
+    pub fn failure(&self) -> Option<String> {
+        if self.functions.is_empty() {
+            return Some(match self.left_out.is_empty() {
+                true => "no function was compared: the robot has none of those that are asked for".to_string(),
+                false => {
+                    let all = self.left_out.join(", ");
+                    format!("no function was compared: the reference has no formulation of {all}")
+                }
+            });
+        }
+        let is_within = self.functions.values().all(|worst| worst.error <= self.bound);
+        (!is_within).then(|| format!("an error exceeds the bound {:.1e}", self.bound))
+    }
+
+    /// Whether something was compared, and all errors are within the bound.
     pub fn passes(&self) -> bool {
-        self.functions.values().all(|worst| worst.error <= self.bound)
+        self.failure().is_none()
     }
 }
 

@@ -6,7 +6,7 @@ use std::collections::BTreeMap;
 use std::fmt::Write;
 use straightline_codegen::diagnostic::{Diagnostics, Source};
 use straightline_codegen::equations::Robot;
-use straightline_codegen::function::base_parameter_lists;
+use straightline_codegen::function::{base_parameter_lists, BaseParameterList};
 use straightline_codegen::model::{self, ModelOptions};
 use straightline_codegen::options::{scene_file, Options};
 use straightline_codegen::Function;
@@ -102,6 +102,11 @@ impl Numbered {
 
     /// Names and values of its base parameters, and of what its support feels.
     fn lists(&self, scene: &str) -> Vec<(Vec<String>, Vec<f64>)> {
+        self.lists_with(scene).into_iter().map(|list| (list.names, list.values)).collect()
+    }
+
+    /// The same with all that is said of them.
+    fn lists_with(&self, scene: &str) -> Vec<BaseParameterList> {
         let mut diagnostics = Diagnostics::new();
         let read = scene_file::read(&Source::new("scene.toml", scene), &mut diagnostics);
         let options = read.unwrap_or_else(|| panic!("{diagnostics}")).into_options(Options::default());
@@ -110,7 +115,7 @@ impl Numbered {
         let robot = Robot::new(model.unwrap_or_else(|| panic!("{diagnostics}")));
         let functions = [Function::TorqueRegressor, Function::BaseWrenchRegressor];
         let robot = robot.knowing_base_parameters(&functions, &options.scene);
-        base_parameter_lists(&robot.model, &functions).into_iter().map(|list| (list.names, list.values)).collect()
+        base_parameter_lists(&robot.model, &functions)
     }
 
     /// The same robot with one of its numbers greater.
@@ -121,27 +126,19 @@ impl Numbered {
     }
 }
 
-/// What a name says: symbols with their factors, and how many more there are.
-struct Group {
-    factors: BTreeMap<String, f64>,
-    more: usize,
-}
+/// What a name says: symbols with their factors.
+type Group = BTreeMap<String, f64>;
 
-impl Group {
-    fn of(name: &str) -> Group {
-        let signed = name.replace(" - ", " + -");
-        let terms = signed.split(" + ").filter(|term| !term.ends_with(" more"));
-        let term = |term: &str| match (term.split_once('*'), term.strip_prefix('-')) {
-            (Some((factor, symbol)), _) => {
-                (symbol.to_string(), factor.parse().unwrap_or_else(|_| panic!("{factor} in {name}")))
-            }
-            (None, Some(symbol)) => (symbol.to_string(), -1.0),
-            (None, None) => (term.to_string(), 1.0),
-        };
-        let more = signed.strip_suffix(" more").and_then(|rest| rest.rsplit(' ').next());
-        let more = more.map_or(0, |number| number.parse().unwrap_or_else(|_| panic!("{number} in {name}")));
-        Group { factors: terms.map(term).collect(), more }
-    }
+fn group(name: &str) -> Group {
+    let signed = name.replace(" - ", " + -");
+    let term = |term: &str| match (term.split_once('*'), term.strip_prefix('-')) {
+        (Some((factor, symbol)), _) => {
+            (symbol.to_string(), factor.parse().unwrap_or_else(|_| panic!("{factor} in {name}")))
+        }
+        (None, Some(symbol)) => (symbol.to_string(), -1.0),
+        (None, None) => (term.to_string(), 1.0),
+    };
+    signed.split(" + ").map(term).collect()
 }
 
 /// Factors are written to four digits.
@@ -153,36 +150,26 @@ const NOTHING: f64 = 1e-11;
 fn names_say_the_groups(robot: &Numbered, scene: &str) {
     const STEP: f64 = 1e-3;
     let before = robot.lists(scene);
-    let of_list = |(names, _): &(Vec<String>, Vec<f64>)| names.iter().map(|name| Group::of(name)).collect();
+    let of_list = |(names, _): &(Vec<String>, Vec<f64>)| names.iter().map(|name| group(name)).collect();
     let groups: Vec<Vec<Group>> = before.iter().map(of_list).collect();
     for ((names, values), groups) in before.iter().zip(&groups) {
-        for ((name, value), group) in names.iter().zip(values).zip(groups).filter(|(_, group)| group.more == 0) {
-            let terms: Vec<f64> = group.factors.iter().map(|(symbol, x)| x * robot.numbers[symbol]).collect();
+        for ((name, value), group) in names.iter().zip(values).zip(groups) {
+            let terms: Vec<f64> = group.iter().map(|(symbol, x)| x * robot.numbers[symbol]).collect();
             let [sum, size] = [terms.iter().sum::<f64>(), terms.iter().map(|x| x.abs()).sum()];
             println!("{value:10.6} {name}");
             assert!((sum - value).abs() <= DIGITS * size, "{name}: {sum} by its name, {value}");
         }
     }
-    let mut unnamed: Vec<Vec<usize>> = groups.iter().map(|groups| vec![0; groups.len()]).collect();
     for symbol in robot.numbers.keys() {
         let after = robot.with_more(symbol, STEP).lists(scene);
-        for (((before, after), groups), unnamed) in before.iter().zip(after).zip(&groups).zip(&mut unnamed) {
+        for ((before, after), groups) in before.iter().zip(after).zip(&groups) {
             assert_eq!(before.0, after.0, "names are about no numbers of links");
             for (k, group) in groups.iter().enumerate() {
                 let slope = (after.1[k] - before.1[k]) / STEP;
-                match group.factors.get(symbol) {
-                    Some(factor) => {
-                        let off = (slope - factor).abs();
-                        assert!(off <= DIGITS * factor.abs() + NOTHING, "{}: {slope} by {symbol}", before.0[k]);
-                    }
-                    None => unnamed[k] += usize::from(slope.abs() > NOTHING),
-                }
+                let factor = group.get(symbol).copied().unwrap_or(0.0);
+                let off = (slope - factor).abs();
+                assert!(off <= DIGITS * factor.abs() + NOTHING, "{}: {slope} by {symbol}", before.0[k]);
             }
-        }
-    }
-    for ((list, groups), unnamed) in before.iter().zip(&groups).zip(unnamed) {
-        for ((name, group), unnamed) in list.0.iter().zip(groups).zip(unnamed) {
-            assert_eq!(unnamed, group.more, "{name}: what it does not name changes it");
         }
     }
 }
@@ -212,10 +199,22 @@ fn names_say_which_rotors_frictions_and_springs_have_columns() {
 #[test]
 fn a_name_is_read_as_the_sum_that_it_is() {
     let expected = [("Izz2", 1.0), ("m3", -0.0961), ("mx3", 0.31), ("my2", -1.0)];
-    let expected: BTreeMap<String, f64> = expected.map(|(symbol, x)| (symbol.to_string(), x)).into();
-    for (name, more) in [("-my2 + Izz2 + 0.31*mx3 - 0.0961*m3", 0), ("-my2 + Izz2 + 0.31*mx3 - 0.0961*m3 + 4 more", 4)]
-    {
-        let group = Group::of(name);
-        assert_eq!((group.factors, group.more), (expected.clone(), more), "{name}");
-    }
+    let expected: Group = expected.map(|(symbol, x)| (symbol.to_string(), x)).into();
+    assert_eq!(group("-my2 + Izz2 + 0.31*mx3 - 0.0961*m3"), expected);
+}
+
+/// What joints add is in no column where the scene names none: the list says of which joints.
+#[test]
+fn what_has_no_column_is_named() {
+    let robot = Numbered::new(PARALLEL, false);
+    let left_out = |scene: &str| robot.lists_with(scene).remove(0).left_out;
+    let joints = "j1, j2, j3";
+    let all = ["rotor_inertia", "damping", "coulomb", "stiffness"];
+    let without: Vec<String> = all.iter().map(|word| format!("`{word}` of {joints}")).collect();
+    let said = left_out("");
+    assert!(said.contains(&without.join("; ")), "{said}");
+    let said = left_out("[regressor]\nrotor_inertia = true\nstiffness = true\n");
+    assert!(said.contains(&without[1..3].join("; ")) && !said.contains("stiffness"), "{said}");
+    let every: String = all.iter().map(|word| format!("{word} = true\n")).collect();
+    assert_eq!(left_out(&format!("[regressor]\n{every}")), "");
 }

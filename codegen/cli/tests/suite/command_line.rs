@@ -198,6 +198,26 @@ fn verify_finds_roundings_only() {
     }
 }
 
+/// A comparison of nothing is no proof: it ends as one that failed, whatever is printed.
+#[test]
+fn verify_fails_where_nothing_is_compared() {
+    let robots = concat!(env!("CARGO_MANIFEST_DIR"), "/../../robots");
+    let [robot, scene] =
+        ["descriptions/planar_2r.toml", "scenes/planar_2r_elastic.toml"].map(|file| format!("{robots}/{file}"));
+    let one =
+        ["verify", &robot, "--scene", &scene, "--states", "3", "--function", "driven_forward_dynamics_derivatives"];
+    for json in [&[][..], &["--json"]] {
+        let run = straightline(&[&one, json].concat());
+        assert_eq!(run.code, 1, "{}", run.err);
+        let why = "no function was compared: the reference has no formulation of driven_forward_dynamics_derivatives";
+        assert!(run.err.contains(why), "{}", run.err);
+    }
+    let two = [&one[..], &["--function", "inverse_dynamics"]].concat();
+    let run = straightline(&two);
+    assert_eq!(run.code, 0, "{}", run.err);
+    assert!(run.out.contains("has no formulation of driven_forward_dynamics_derivatives"), "{}", run.out);
+}
+
 #[test]
 fn a_scene_reaches_every_command_and_the_command_line_wins() {
     let directory = scratch("scene");

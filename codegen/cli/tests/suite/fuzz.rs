@@ -67,13 +67,19 @@ fn files(folder: &str, endings: &[&str]) -> Vec<Seed> {
 impl Corpus {
     fn new() -> Corpus {
         let mut corpus = Corpus::default();
-        for folder in
-            ["robots/descriptions", "generated_tests/count_robots", "codegen/tests/files", "codegen/tests/messages"]
-        {
+        for folder in [
+            "robots/descriptions",
+            "generated_tests/count_robots",
+            "generated_tests/reference/joints/robots",
+            "codegen/tests/files",
+            "codegen/tests/messages",
+        ] {
             if folder == "codegen/tests/messages" {
                 corpus.sound = corpus.robots.len();
             }
-            corpus.robots.extend(files(folder, &["urdf", "toml"]).into_iter().filter(|f| f.text.len() < 100_000));
+            corpus
+                .robots
+                .extend(files(folder, &["urdf", "toml", "xml", "sdf"]).into_iter().filter(|f| f.text.len() < 100_000));
         }
         for (folder, robot) in [("robots/scenes", None), ("codegen/tests/scene_messages", Some("arm.toml"))] {
             if robot.is_some() {

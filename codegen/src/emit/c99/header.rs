@@ -64,6 +64,9 @@ impl Interface<'_> {
             for (i, (name, value)) in list.names.iter().zip(&list.values).enumerate() {
                 let _ = writeln!(out, " *   {i:>3}  {} = {value:e}", c_comment(name));
             }
+            if !list.left_out.is_empty() {
+                let _ = writeln!(out, " *{}", c_comment(&list.left_out));
+            }
         }
         out.push_str(" * Frames:\n");
         for (i, frame) in self.generated.frames.iter().enumerate() {

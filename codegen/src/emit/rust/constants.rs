@@ -175,8 +175,8 @@ fn of_followers(model: &Model<Dd>, scalar: Scalar) -> Vec<AssociatedConstant> {
 fn of_base_parameters(generated: &Generated) -> Vec<AssociatedConstant> {
     let functions: Vec<Function> = generated.items.iter().map(|item| item.function).collect();
     let mut constants = Vec::new();
-    for BaseParameterList { prefix, what, names, values, places } in base_parameter_lists(&generated.model, &functions)
-    {
+    let lists = base_parameter_lists(&generated.model, &functions);
+    for BaseParameterList { prefix, what, names, values, left_out, places } in lists {
         let n = names.len();
         let (count, all) = (format!("{prefix}_PARAMETER_COUNT"), format!("{prefix}_PARAMETER_NAMES"));
         let size = AssociatedConstant::new(
@@ -197,7 +197,7 @@ fn of_base_parameters(generated: &Generated) -> Vec<AssociatedConstant> {
             format!("{prefix}_PARAMETERS"),
             ConstantType::Numbers(generated.scalar, vec![n]),
             format!("[{}]", numbers.join(", ")),
-            "Their values \\[kg, kg·m, kg·m²; of joints as their parameters\\], without bodies that are inputs.",
+            format!("Their values \\[kg, kg·m, kg·m²; of joints as their parameters\\], without bodies that are inputs.{left_out}"),
         );
         constants.extend([size, names, values]);
         for (k, word) in ["ROWS", "COLUMNS"].into_iter().enumerate() {
