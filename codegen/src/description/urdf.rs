@@ -6,8 +6,8 @@
 use super::reader::{FileReader, Range64};
 use super::xml::{self, children, tag, Span};
 use super::{
-    messages, Angle, AngleUnit, Description, FileFormat, JointDrive, JointLimits, JointType, Noted, Placement,
-    Rotation, WrittenCoupling, WrittenInertial, WrittenJoint, WrittenLink, WrittenPose,
+    messages, Angle, AngleUnit, BaseKind, Description, FileFormat, JointDrive, JointLimits, JointType, Noted,
+    Placement, Rotation, WrittenCoupling, WrittenInertial, WrittenJoint, WrittenLink, WrittenPose,
 };
 use crate::diagnostic::wording::closest;
 use crate::diagnostic::{Diagnostics, Source};
@@ -61,7 +61,28 @@ fn read_document(mut reader: FileReader, document: &Document) -> Option<Descript
         }
     }
     description.ignored = reader.into_ignored();
+    float_base(&mut description);
     Some(description)
+}
+
+/// A link without mass that carries one floating joint at its origin, and nothing else, is the world: the link on that joint is a floating base.
+fn float_base(robot: &mut Description) {
+    let Some(ground) = robot.root().filter(|root| root.inertial.is_none()).map(|root| root.name.value.clone()) else {
+        return;
+    };
+    let on_ground = |joint: &WrittenJoint| joint.parent.value == ground;
+    let is_base = |joint: &WrittenJoint| match &joint.placement {
+        Placement::Frames { origin, .. } => joint.kind.value.is_free() && origin.is_identity(),
+        _ => false,
+    };
+    let Some(joint) = robot.joints.iter().find(|joint| on_ground(joint) && is_base(joint)) else { return };
+    let place = joint.kind.place.clone();
+    if robot.joints.iter().filter(|joint| on_ground(joint)).count() > 1 {
+        return;
+    }
+    robot.joints.retain(|joint| !on_ground(joint));
+    robot.links.retain(|link| link.name.value != ground);
+    robot.base = Some(Noted::new(BaseKind::Floating, place));
 }
 
 /// The element's name, if it is of the same namespace as `owner`.

@@ -197,6 +197,26 @@ fn a_floating_base_is_the_first_body() {
     assert_eq!(model_of("arm.toml", &in_file, &ModelOptions::default()).0.nv(), 9);
 }
 
+/// A link without mass that carries the robot on a floating joint is the world, as Pinocchio has it; one that stands elsewhere, or carries more, is not.
+#[test]
+fn a_floating_joint_on_the_world_is_a_floating_base() {
+    let ground = "<link name=\"ground\"/><joint name=\"free\" type=\"floating\"><parent link=\"ground\"/><child link=\"base_link\"/>";
+    let on_ground = |rest: &str| AWKWARD.replace("</robot>", &format!("{ground}{rest}</robot>"));
+    let options = ModelOptions { floating_base: true, ..ModelOptions::default() };
+    let (by_option, _) = model_of("awkward.urdf", AWKWARD, &options);
+    for rest in ["</joint>", "<origin xyz=\"0 0 0\" rpy=\"0 0 0\"/></joint>"] {
+        let (by_file, _) = model_of("awkward.urdf", &on_ground(rest), &ModelOptions::default());
+        assert_eq!(by_file, by_option);
+    }
+    for rest in [
+        "<origin xyz=\"0 0 0.1\"/></joint>",
+        "</joint><link name=\"post\"/><joint name=\"fix\" type=\"fixed\"><parent link=\"ground\"/><child link=\"post\"/></joint>",
+    ] {
+        let (model, diagnostics) = load(&Source::new("awkward.urdf", on_ground(rest)), &ModelOptions::default());
+        assert!(model.is_none() && diagnostics.to_string().contains("error[floating-joint]"), "{diagnostics}");
+    }
+}
+
 #[test]
 fn joints_stand_in_the_order_that_is_asked_for() {
     let order = |names: &[&str]| Some(names.iter().map(|n| n.to_string()).collect());

@@ -69,6 +69,7 @@ fn what_changes_the_dynamics_and_is_not_read_is_an_error() {
         (revolute, "type=\"spherical\"", "unknown-word", 6),
         (revolute, "type=\"universal\"", "missing-element", 6),
         (revolute, "type=\"screw\"", "missing-element", 6),
+        (revolute, "type=\"screw\"><screw_thread_pitch>0</screw_thread_pitch", "not-supported-yet", 6),
         (revolute, "type=\"gearbox\"", "missing-element", 6),
         ("<parent>a</parent>", "<parent>c</parent>", "frame-unknown", 6),
         ("<parent>a</parent>", "<parent>b</parent>", "cycle", 6),

@@ -146,7 +146,13 @@ impl<'d, 'i> Sdf<'_, 'd, 'i> {
         owner: &str,
     ) -> Option<f64> {
         if let Some(pitch) = pitch {
-            return self.number_in(Some(pitch), owner).map(|pitch| pitch.value / TAU);
+            let value = self.number_in(Some(pitch), owner)?.value / TAU;
+            if value == 0.0 {
+                let why = "a thread without pitch does not slide";
+                self.refuse(pitch, owner, why, "write type `revolute`, or a pitch in m per revolution");
+                return None;
+            }
+            return Some(value);
         }
         let Some(old) = old else {
             let example = "<screw_thread_pitch>0.005</screw_thread_pitch>";
