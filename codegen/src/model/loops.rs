@@ -155,8 +155,7 @@ fn directions(of: &ClosedLoop<Dd>, model: &Model<Dd>, zero: &[Dd]) -> Vec<Vec3<D
     let bodies = model.bodies_of_loop(of);
     let base = pose(model, zero, model.parting(of));
     let axis = |b: BodyId| base.rotation.transpose_mul(pose(model, zero, Some(b)).rotation.column(2));
-    let unit = |k: usize| Vec3::from([0, 1, 2].map(|i| if i == k { Dd::ONE } else { Dd::ZERO }));
-    let all = vec![unit(0), unit(1), unit(2)];
+    let all = vec![Vec3::unit(0), Vec3::unit(1), Vec3::unit(2)];
     let joints = || bodies.iter().map(|b| (*b, &model.bodies[*b].joint.kind));
     let Some(normal) = joints().find(|(_, kind)| kind.is_single() && kind.turns()).map(|(b, _)| axis(b)) else {
         return all;
@@ -177,7 +176,8 @@ fn directions(of: &ClosedLoop<Dd>, model: &Model<Dd>, zero: &[Dd]) -> Vec<Vec3<D
     // across the normal: what is left of the axis that is least along it
     let parts = normal.to_array().map(|x| x.to_f64().abs());
     let least = (0..3).min_by(|a, b| parts[*a].total_cmp(&parts[*b])).expect("there are three");
-    let across = unit(least) - normal.scale(normal.dot(unit(least)));
+    let axis = Vec3::unit(least);
+    let across = axis - normal.scale(normal.dot(axis));
     let across = across.scale(Dd::ONE / across.dot(across).sqrt());
     vec![snap_vector(across, 1.0), snap_vector(normal.cross(across), 1.0)]
 }

@@ -61,7 +61,7 @@ pub fn reduced_mass_matrix<T: Real>(model: &ReducedModel<T>, q: &[T]) -> Vec<T> 
                 // f = e_k × m c,  n = J e_k in own axes, J = tr(Σ) 1 − Σ
                 let (ms, inertia) = (composite.first_moment, composite.second_moment.second_moment_to_inertia());
                 let columns = [0, 1, 2].map(|k| {
-                    let axis = Vec3::from(core::array::from_fn(|j| if j == k { T::one() } else { T::zero() }));
+                    let axis = Vec3::unit(k);
                     ForceVector { moment: inertia * axis, force: axis.cross(ms) }
                 });
                 for (j, column) in columns.iter().enumerate() {

@@ -72,10 +72,10 @@ impl<T: Real> PointField<T> {
             ReducedJoint::Turn => PointField { turn: Vec3::unit_z(), shift: zero },
             ReducedJoint::Slide => PointField { turn: zero, shift: Vec3::unit_z() },
             ReducedJoint::Free | ReducedJoint::Ball => {
-                let axis = core::array::from_fn(|k| if k == row % 3 { T::one() } else { T::zero() });
+                let axis = Vec3::unit(row % 3);
                 match over.kind == ReducedJoint::Free && row < 3 {
-                    true => PointField { turn: zero, shift: Vec3::from(axis) },
-                    false => PointField { turn: Vec3::from(axis), shift: zero },
+                    true => PointField { turn: zero, shift: axis },
+                    false => PointField { turn: axis, shift: zero },
                 }
             }
         }

@@ -27,6 +27,11 @@ impl<T: Real> Vec3<T> {
         Vec3::new(T::zero(), T::zero(), T::zero())
     }
 
+    /// The unit vector along axis `k`: 0 is x.
+    pub fn unit(k: usize) -> Self {
+        Vec3::from(core::array::from_fn(|j| if j == k { T::one() } else { T::zero() }))
+    }
+
     /// The unit vector along z.
     pub fn unit_z() -> Self {
         Vec3::new(T::zero(), T::zero(), T::one())
