@@ -5,10 +5,10 @@ use crate::function::{Extent, ForwardDynamicsMethod, Function, Quantity};
 use straightline_core::algorithms::{bias_force, Ltdl};
 use straightline_core::model::Model;
 use straightline_core::spatial::Vec3;
-use straightline_core::Dd;
+use straightline_core::{Dd, Real};
 use straightline_graph::certify::{ErrorAnalysis, FloatFormat, Interval};
 use straightline_graph::expr::{Graph, Op, Port};
-use straightline_graph::Scalar;
+use straightline_graph::{EveryScalar, Scalar};
 
 /// What a column is.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -138,9 +138,13 @@ impl ColumnBounds {
                 factor.solve(&net.collect::<Vec<Dd>>())
             }
         };
-        let slopes_at = |qdd: &[Dd]| {
-            let motion = [q.clone(), qd.clone(), qdd.to_vec()];
-            Function::InverseDynamicsDerivatives.evaluate(&model, &[], ForwardDynamicsMethod::default(), &motion)
+        // in every scalar, in which all functions are compiled anyway: once more in double-double they take as long to build again
+        let in_every_scalar: Model<EveryScalar> = model.cast();
+        let slopes_at = |qdd: &[Dd]| -> Vec<Dd> {
+            let motion = [&q, &qd, qdd].map(|x| x.iter().copied().map(EveryScalar::constant).collect());
+            let method = ForwardDynamicsMethod::default();
+            let slopes = Function::InverseDynamicsDerivatives.evaluate(&in_every_scalar, &[], method, &motion);
+            slopes.into_iter().map(|x| x.wide.value).collect()
         };
         let needs_slopes =
             self.all.iter().any(|(of, ..)| matches!(of, SolvedFor::Slope(by, _) if *by != Quantity::Force));
