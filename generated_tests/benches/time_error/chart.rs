@@ -225,7 +225,7 @@ fn legend<DB: DrawingBackend>(
 /// The same as a table.
 pub fn table(panel: &Panel) -> String {
     let mut text = format!(
-        "# {}: {}, time against error\n\n`cargo bench -p straightline-generated-tests --features charts --bench time_error -- function {} {}`\n\n\
+        "# {}: {}, time against error\n\n`cargo bench -p straightline-generated-tests --bench time_error -- function {} {}`\n\n\
          Compiled for the processor of the machine, which was shared with other work while this ran: compare within the table. Errors over the greatest\n\
          output in the limits of the joints. {}.\n\n\
          | method | warm, ns | median | cold, ns | rms error | worst found | certified |\n|---|---|---|---|---|---|---|\n",

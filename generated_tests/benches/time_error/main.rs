@@ -1,10 +1,10 @@
 //! Run time against error: what accuracy costs, and what is gained by leaving things out.
 //!
 //! ```text
-//! cargo bench -p straightline-generated-tests --features charts --bench time_error -- function panda [inverse_dynamics]
-//! cargo bench -p straightline-generated-tests --features charts --bench time_error -- simulation
-//! cargo bench -p straightline-generated-tests --features charts --bench time_error -- scaling
-//! cargo bench -p straightline-generated-tests --features charts --bench time_error
+//! cargo bench -p straightline-generated-tests --bench time_error -- function panda [inverse_dynamics]
+//! cargo bench -p straightline-generated-tests --bench time_error -- simulation
+//! cargo bench -p straightline-generated-tests --bench time_error -- scaling
+//! cargo bench -p straightline-generated-tests --bench time_error
 //! ```
 //!
 //! The last one makes all charts; `redraw panda inverse_dynamics` draws what was measured once more. `STRAIGHTLINE_PEERS_PYTHON` names a Python that has `pinocchio`, for its point in them. Each is a picture, a table and JSON under `generated_tests/record/`. Errors are those of the code

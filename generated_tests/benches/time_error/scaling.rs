@@ -106,7 +106,7 @@ pub fn run() {
         errors.push(new(format!("{}, f32", kind.0), i, true));
     }
     let mut text = String::from(
-        "# Scaling with the number of joints\n\n`cargo bench -p straightline-generated-tests --features charts --bench time_error -- scaling`\n\n\
+        "# Scaling with the number of joints\n\n`cargo bench -p straightline-generated-tests --bench time_error -- scaling`\n\n\
          Chains of rods about x, y and z in turn. Time: f64, warm, compiled for the processor, best of 12. Errors: worst of 50 random\n\
          states over the greatest result of the state. Generation: seconds from the robot file to the source, search for the cheapest form\n\
          included. rustc: seconds to compile a program of that function, of which an empty one takes the first tenths.\n\n\

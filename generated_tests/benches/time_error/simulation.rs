@@ -184,7 +184,7 @@ pub fn run() {
     let mut energy = Vec::new();
     let mut rows = Vec::new();
     let mut text = format!(
-        "# Simulation: time against error\n\n`cargo bench -p straightline-generated-tests --features charts --bench time_error -- simulation`\n\n\
+        "# Simulation: time against error\n\n`cargo bench -p straightline-generated-tests --bench time_error -- simulation`\n\n\
          {ROBOT} swings freely from ({}, {}) rad. Error of the state after {COMPARED} s over its greatest component ({size:.2}), against a\n\
          double-double trajectory; energy: the greatest change in {WATCHED} s over the greatest |V|.\n\n\
          | integrator | numbers | step, s | µs of processor per simulated second | error of the state | energy |\n|---|---|---|---|---|---|\n",
