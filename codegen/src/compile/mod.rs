@@ -86,7 +86,21 @@ fn compile_and_explain(source: &Source, options: &Options, explained: bool) -> R
     readback::checked(generated.with_others(others?))
 }
 
-fn compile_in_one_scalar(source: &Source, options: &Options, explained: bool) -> Result<Generated, Diagnostics> {
+/// Programs without text, of a robot in its scene.
+struct Compiling {
+    /// The robot without its scene.
+    whole: Model<Dd>,
+    robot: Robot,
+    frames: Vec<String>,
+    options: Options,
+    /// The options, spelled out for the robot.
+    resolved: Options,
+    programs: Vec<TracedProgram>,
+    diagnostics: Diagnostics,
+    hash: u64,
+}
+
+fn compiling(source: &Source, options: &Options) -> Result<Compiling, Diagnostics> {
     let Prepared { description, whole, model, frames, options, resolved, mut diagnostics } = prepare(source, options)?;
     let hash = hash(source.text(), &diagnostics, &resolved);
     let robot = Robot::new(model).knowing_base_parameters(&resolved.functions, &resolved.scene);
@@ -94,21 +108,55 @@ fn compile_in_one_scalar(source: &Source, options: &Options, explained: bool) ->
     let functions: Vec<Function> = resolved.functions.iter().copied().filter(|f| !is_empty(f)).collect();
     let programs = programs::programs(&robot, &frames, &functions, &resolved);
     let mut programs = programs.map_err(|wrong| only(no_form(&wrong, &robot.model, options.scalar, &description)))?;
-    let beyond = |program: &str, why: &str, diagnostics: &mut Diagnostics| {
-        let complaint = scene::messages::program_beyond_scalar(program, options.scalar.name(), why);
-        options.scene.places.complain("options.scalar", complaint, diagnostics);
-    };
     for program in &mut programs {
         if let Err(wrong) = mix_precisions(&robot, &frames, program, &resolved) {
             diagnostics.push(wrong.error(&robot.model));
         }
         if let Some(why) = range::of_program(&robot.model, &program.graph, options.scalar) {
-            beyond(program.function.name(), &why, &mut diagnostics);
+            beyond(&options, program.function.name(), &why, &mut diagnostics);
         }
         if let Some(plainer) = &program.plainer {
             diagnostics.push(plainer.warning(&robot.model));
         }
     }
+    Ok(Compiling { whole, robot, frames, options, resolved, programs, diagnostics, hash })
+}
+
+/// What is said of a program whose numbers the scalar does not have.
+fn beyond(options: &Options, program: &str, why: &str, diagnostics: &mut Diagnostics) {
+    let complaint = scene::messages::program_beyond_scalar(program, options.scalar.name(), why);
+    options.scene.places.complain("options.scalar", complaint, diagnostics);
+}
+
+/// The programs of all functions that are wanted, checked as those of texts are, for what executes them without a text.
+#[derive(Clone, Debug)]
+pub struct CheckedPrograms {
+    /// One per function, in their order.
+    pub programs: Vec<TracedProgram>,
+    /// The robot in its scene.
+    pub model: Model<Dd>,
+    /// The frames of the functions that answer per frame.
+    pub frames: Vec<String>,
+    /// What is doubtful or worth knowing.
+    pub warnings: Diagnostics,
+}
+
+/// From the text of a robot file to the programs of its dynamics.
+///
+/// # Errors
+/// As [`compile`], but for budgets.
+pub fn compile_programs(source: &Source, options: &Options) -> Result<CheckedPrograms, Diagnostics> {
+    let Compiling { robot, frames, programs, mut diagnostics, .. } = compiling(source, options)?;
+    diagnostics.sort();
+    match diagnostics.has_errors() {
+        true => Err(diagnostics),
+        false => Ok(CheckedPrograms { programs, model: robot.model, frames, warnings: diagnostics }),
+    }
+}
+
+fn compile_in_one_scalar(source: &Source, options: &Options, explained: bool) -> Result<Generated, Diagnostics> {
+    let compiling = compiling(source, options)?;
+    let Compiling { whole, robot, frames, options, resolved, mut programs, mut diagnostics, hash } = compiling;
     let measures: Vec<(Function, Measures)> =
         programs.iter().map(|p| (p.function, Measures::of(p, options.scalar))).collect();
     budget::check(&whole, &frames, &measures, &options, &mut diagnostics);
@@ -145,7 +193,7 @@ fn compile_in_one_scalar(source: &Source, options: &Options, explained: bool) ->
         }
         Some((program, why)) => {
             let mut diagnostics = generated.warnings;
-            beyond(&program, &why, &mut diagnostics);
+            beyond(&options, &program, &why, &mut diagnostics);
             Err(diagnostics)
         }
     }

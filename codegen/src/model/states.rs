@@ -52,6 +52,18 @@ pub(crate) fn states(model: &Model<Dd>, inputs: &[Port], count: usize, fast: boo
     Some((0..count).map(|_| inputs.iter().flat_map(|port| of_port(model, port, fast, &mut random)).collect()).collect())
 }
 
+/// As many states beside one another, of inputs by themselves: of each an array, state after state.
+pub fn random_inputs(model: &Model<Dd>, inputs: &[Port], count: usize) -> Vec<Vec<f64>> {
+    let mut random = Random(SEED);
+    let mut all: Vec<Vec<f64>> = vec![Vec::new(); inputs.len()];
+    for _ in 0..count {
+        for (port, x) in inputs.iter().zip(&mut all) {
+            x.extend(of_port(model, port, false, &mut random));
+        }
+    }
+    all
+}
+
 /// One of these states, of one port.
 pub(crate) fn of_port(model: &Model<Dd>, port: &Port, fast: bool, random: &mut Random) -> Vec<f64> {
     let mut x = values(model, port, Kind::Anywhere, random);

@@ -6,7 +6,7 @@ use straightline_graph::schedule::{ProgramPart, Schedule};
 
 /// A sum whose one term is a product: ±x·y ± c.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) struct Fused {
+pub struct Fused {
     /// Whether the product is subtracted.
     pub negated: bool,
     /// The factors.
@@ -17,7 +17,7 @@ pub(super) struct Fused {
 
 /// The sums of a part that take a product in, and what they take in: those that [`Graph::counts`] counts as `fma`, as far as
 /// product and sum are in the same part.
-pub(super) fn fusions(graph: &Graph, part: &ProgramPart) -> (Vec<Option<Fused>>, Vec<bool>) {
+pub fn fusions(graph: &Graph, part: &ProgramPart) -> (Vec<Option<Fused>>, Vec<bool>) {
     let mut uses = graph.uses();
     // what crosses to a loop over limbs, or from one, is a value of its own
     uses.iter_mut().zip(graph.uses_across()).for_each(|(uses, across)| *uses += across);
