@@ -1,6 +1,6 @@
 //! Every function of the robots that are compiled at build time: time warm and cold, error, operations and size, in one row.
 //!
-//! `cargo bench -p straightline-robots --bench functions [FILTER]` prints criterion's report, then the
+//! `cargo bench -p straightline-robots --features bench --bench functions [FILTER]` prints criterion's report, then the
 //! table. Warm: another one of 1024 states at each call. Cold: caches and branch predictors are filled with other things before
 //! each call, as in a control loop with other work; a read of the clock is in that time. Both are the tenth percentile of the
 //! samples, which other work on the machine moves less than the median. The error is against the generic runtime

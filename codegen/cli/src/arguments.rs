@@ -86,6 +86,17 @@ Examples:
 
 {EXIT_CODES}"))]
     Verify(Verify),
+    /// Measure every function on this machine, by machine code that is made at once: rustc is not needed
+    #[command(after_help = format!("\
+Times are of machine code with the bits of generated Rust, in nanoseconds: of a call, and per state of a batch on one
+thread. Errors are those of `verify`.
+
+Examples:
+  straightline bench panda.urdf
+  straightline bench solo12.urdf --floating-base --scalar f32 --function inverse_dynamics --json
+
+{EXIT_CODES}"))]
+    Bench(Bench),
     /// Simulate a robot under torques or a controller
     #[command(after_help = format!("\
 The experiment is a TOML file (codegen/SIMULATION.md), or CSV, JSON or Parquet samples of torques.
@@ -152,6 +163,7 @@ impl CliCommand {
             CliCommand::Report(a) => &a.model,
             CliCommand::Check(a) => &a.model,
             CliCommand::Verify(a) => &a.model,
+            CliCommand::Bench(a) => &a.model,
             CliCommand::Simulate(a) => return a.model(),
             CliCommand::Analyze(a) => return a.model(),
             CliCommand::Export(a) => &a.model,
@@ -175,6 +187,7 @@ impl CliCommand {
             CliCommand::Check(_) => "checking",
             CliCommand::Convert(_) => "converting",
             CliCommand::Verify(_) => "verifying",
+            CliCommand::Bench(_) => "measuring",
             CliCommand::Simulate(_) => "simulating",
             CliCommand::Analyze(_) => "analysing",
             CliCommand::Export(_) => "exporting",
@@ -251,6 +264,25 @@ pub struct Verify {
     #[arg(long, value_name = "S", default_value_t = 1)]
     pub seed: u64,
     /// As JSON: {"robot": …, "bound": …, "functions": {"inverse_dynamics": {"error": …, "state": …}}}
+    #[arg(long)]
+    pub json: bool,
+    #[command(flatten)]
+    pub program: ProgramArgs,
+    #[command(flatten)]
+    pub model: ModelArgs,
+}
+
+#[derive(Debug, Args)]
+pub struct Bench {
+    #[arg(help = robot_file())]
+    pub robot: PathBuf,
+    /// Number of random states that errors are the worst of
+    #[arg(long, value_name = "N", default_value_t = 20, value_parser = clap::value_parser!(u32).range(1..))]
+    pub states: u32,
+    /// Seed of the random states
+    #[arg(long, value_name = "S", default_value_t = 1)]
+    pub seed: u64,
+    /// As JSON: {"robot": …, "execution": …, "functions": {"inverse_dynamics": {"nanoseconds_per_call": …}}}
     #[arg(long)]
     pub json: bool,
     #[command(flatten)]

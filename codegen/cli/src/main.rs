@@ -4,6 +4,7 @@
 #![forbid(unsafe_code)]
 
 mod arguments;
+mod bench;
 #[cfg(feature = "simulation")]
 mod contact;
 mod convert;
@@ -68,6 +69,7 @@ fn main() -> ExitCode {
         CliCommand::Check(a) => check(&a),
         CliCommand::Convert(a) => convert::convert_file(&a),
         CliCommand::Verify(a) => verify(&a),
+        CliCommand::Bench(a) => bench::bench(&a),
         CliCommand::Export(a) => export(&a),
         CliCommand::Simulate(a) => motion::simulate(&a),
         CliCommand::Analyze(a) => motion::analyze(&a),

@@ -306,6 +306,32 @@ pub fn report(report: &Report) -> io::Result<()> {
     Ok(())
 }
 
+/// Figures of functions, one per line.
+pub struct Table {
+    out: anstream::Stdout,
+    width: usize,
+}
+
+impl Table {
+    /// Under this title, of these functions.
+    pub fn new(title: &str, functions: impl IntoIterator<Item = impl AsRef<str>>) -> io::Result<Table> {
+        let mut out = stdout();
+        writeln!(out, "{title}\n")?;
+        Ok(Table { out, width: name_width(functions) })
+    }
+
+    /// A line of it: what the columns are, or the figures of a function.
+    pub fn row(&mut self, name: &str, columns: &[impl AsRef<str>]) -> io::Result<()> {
+        let columns: String = columns.iter().map(|column| format!("{:>12}", column.as_ref())).collect();
+        writeln!(self.out, "{name:<width$}{columns}", width = self.width)
+    }
+
+    /// What is said below it.
+    pub fn foot(mut self, text: &str) -> io::Result<()> {
+        writeln!(self.out, "\n{text}")
+    }
+}
+
 /// The worst error of every function.
 pub fn verification(v: &Verification) -> io::Result<()> {
     let mut out = stdout().lock();

@@ -34,8 +34,15 @@ const WORDS: [Word; 3] = [
         remedy: "C is written outside its room; make a `Routine`, or a part of the `Interface`, and let them write it",
     },
 ];
-const ROOMS: [&str; 6] =
-    ["runtime/core/src", "runtime/src", "codegen/src", "codegen/cli/src", "codegen/macros/src", "simulation/src"];
+const ROOMS: [&str; 7] = [
+    "runtime/core/src",
+    "runtime/src",
+    "codegen/src",
+    "codegen/cli/src",
+    "codegen/macros/src",
+    "simulation/src",
+    "jit/src",
+];
 
 /// Types that may share their name: only one of both is ever compiled, with the feature `simulation` of the command or without.
 const ALTERNATIVES: [&str; 2] = ["Analyze", "Simulate"];

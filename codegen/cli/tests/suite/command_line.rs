@@ -219,6 +219,28 @@ fn verify_fails_where_nothing_is_compared() {
 }
 
 #[test]
+fn bench_measures_every_function_without_a_compiler() {
+    for more in [&["--scalar", "f64"][..], &["--scalar", "f32"], &["--fma"]] {
+        let run = straightline(&[&["bench", ARM, "--states", "3", "--json"], more].concat());
+        assert_eq!(run.code, 0, "{}", run.err);
+        let report: serde_json::Value = serde_json::from_str(&run.out).unwrap();
+        let functions = report["functions"].as_object().unwrap();
+        assert_eq!(functions.len(), 15);
+        for (name, f) in functions {
+            for time in ["nanoseconds_per_call", "nanoseconds_per_state"] {
+                assert!(f[time].as_f64().unwrap() > 0.0, "{name}: {f}");
+            }
+            assert!(f["error"].as_f64().unwrap() <= report["bound"].as_f64().unwrap(), "{name}: {f}");
+        }
+    }
+    let run = straightline(&["bench", ARM, "--states", "3", "--function", "mass_matrix"]);
+    assert_eq!(run.code, 0, "{}", run.err);
+    let row = run.out.lines().find(|line| line.starts_with("mass_matrix")).expect("a line of the function");
+    assert_eq!(row.split_whitespace().count(), 7, "{}", run.out);
+    assert_eq!(straightline(&["bench", "nowhere.urdf"]).code, 3);
+}
+
+#[test]
 fn a_scene_reaches_every_command_and_the_command_line_wins() {
     let directory = scratch("scene");
     let scene = directory.join("still.toml");

@@ -1,0 +1,122 @@
+//! Machine code in memory that can be executed, and sines by the instructions of this machine: the one place with `unsafe`.
+//!
+//! What is called has been written by [`machine`](crate::machine) from instructions of [`allocation`](crate::allocation), which read and write cells of the frame and read
+//! constants, whose numbers are known: [`NativeCode::run`] asserts that both are as long. Pages are written first and made executable then, and are
+//! never both. A function returns to where it was called from, keeps no address and touches nothing else.
+
+use crate::interpreter;
+use crate::number::Number;
+use memmap2::{Mmap, MmapMut};
+use std::io;
+
+/// What is written: see [`x86`](crate::machine::x86). Elsewhere there is none.
+#[cfg(target_arch = "x86_64")]
+type Function<T> = extern "sysv64" fn(*mut T, *const T);
+#[cfg(not(target_arch = "x86_64"))]
+type Function<T> = extern "C" fn(*mut T, *const T);
+
+/// The functions of a tape, one per phase.
+#[derive(Debug)]
+pub struct NativeCode {
+    pages: Mmap,
+    /// Where each begins.
+    starts: Vec<usize>,
+    /// So many numbers a frame has to have, and constants there have to be.
+    lengths: [usize; 2],
+}
+
+impl NativeCode {
+    /// Executable code of these functions.
+    ///
+    /// # Errors
+    /// If the system has no such memory to give.
+    pub fn new(functions: &[Vec<u8>], lengths: [usize; 2]) -> io::Result<NativeCode> {
+        // a page at least: none of no bytes can be had
+        let length = functions.iter().map(Vec::len).sum::<usize>().max(1);
+        let mut pages = MmapMut::map_anon(length)?;
+        let (mut starts, mut at) = (Vec::new(), 0);
+        for function in functions {
+            starts.push(at);
+            pages[at..at + function.len()].copy_from_slice(function);
+            at += function.len();
+        }
+        Ok(NativeCode { pages: pages.make_exec()?, starts, lengths })
+    }
+
+    /// How many bytes there are.
+    pub fn len(&self) -> usize {
+        self.pages.len()
+    }
+
+    /// Runs the function of a phase on a frame.
+    ///
+    /// # Panics
+    /// If the frame or the constants are shorter than the code was made for.
+    #[inline]
+    pub fn run<T>(&self, phase: usize, frame: &mut [T], constants: &[T]) {
+        assert!(frame.len() >= self.lengths[0] && constants.len() >= self.lengths[1], "as long as it was made for");
+        let start = self.pages[self.starts[phase]..].as_ptr();
+        // SAFETY: `start` is the beginning of a function that `machine::x86::function` wrote for this ABI, in pages that live as long as `self`. It
+        // touches `lengths` numbers of frame and constants at most, which are there, and changes those of the frame alone.
+        unsafe {
+            let function: Function<T> = std::mem::transmute(start);
+            function(frame.as_mut_ptr(), constants.as_ptr());
+        }
+    }
+}
+
+/// The instructions that sines are compiled for, found out once.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct SineInstructions(SineTarget);
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum SineTarget {
+    Any,
+    #[cfg(target_arch = "x86_64")]
+    Avx2,
+    #[cfg(target_arch = "x86_64")]
+    Avx512,
+}
+
+impl SineInstructions {
+    /// What every machine has.
+    pub const ANY: SineInstructions = SineInstructions(SineTarget::Any);
+
+    /// The fastest that this machine has.
+    pub fn best() -> SineInstructions {
+        #[cfg(target_arch = "x86_64")]
+        if is_x86_feature_detected!("avx2") && is_x86_feature_detected!("fma") {
+            let is_wide = is_x86_feature_detected!("avx512f")
+                && is_x86_feature_detected!("avx512vl")
+                && is_x86_feature_detected!("avx512dq");
+            return SineInstructions(if is_wide { SineTarget::Avx512 } else { SineTarget::Avx2 });
+        }
+        SineInstructions::ANY
+    }
+
+    /// Sines and cosines of sums of angles, lane by lane: the same bits by all instructions.
+    #[inline]
+    pub fn sin_cos<T: Number, const N: usize>(self, terms: &[[T; N]], fused: bool) -> ([T; N], [T; N]) {
+        match self.0 {
+            SineTarget::Any => interpreter::sin_cos(terms, fused),
+            // SAFETY: only `best` makes these, and only where the machine has the instructions
+            #[cfg(target_arch = "x86_64")]
+            SineTarget::Avx2 => unsafe { sin_cos_by_avx2(terms, fused) },
+            // SAFETY: as above
+            #[cfg(target_arch = "x86_64")]
+            SineTarget::Avx512 => unsafe { sin_cos_by_avx512(terms, fused) },
+        }
+    }
+}
+
+#[cfg(target_arch = "x86_64")]
+#[target_feature(enable = "avx2,fma")]
+fn sin_cos_by_avx2<T: Number, const N: usize>(terms: &[[T; N]], fused: bool) -> ([T; N], [T; N]) {
+    interpreter::sin_cos(terms, fused)
+}
+
+#[cfg(target_arch = "x86_64")]
+#[target_feature(enable = "avx2,fma,avx512f,avx512vl,avx512dq")]
+fn sin_cos_by_avx512<T: Number, const N: usize>(terms: &[[T; N]], fused: bool) -> ([T; N], [T; N]) {
+    interpreter::sin_cos(terms, fused)
+}

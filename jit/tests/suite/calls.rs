@@ -1,0 +1,101 @@
+//! What is wrong with calls and options is said, and batches lie in memory however they like.
+
+use straightline_codegen::diagnostic::Source;
+use straightline_codegen::options::Options;
+use straightline_codegen::scene::{Budget, InputRange, JointRanges, MaxError, Scene};
+use straightline_codegen::{Function, Scalar};
+use straightline_jit::{BatchLayout, CallError, ExecutionMode, LoadError, Robot};
+
+const PLANAR: &str = include_str!("../../../robots/descriptions/planar_2r.toml");
+
+fn planar(execution: ExecutionMode) -> Robot<f64> {
+    let functions = vec![Function::InverseDynamics, Function::MassMatrix];
+    let options = Options { functions, ..Options::default() };
+    Robot::load_to_run(&Source::new("planar2r.toml", PLANAR), &options, execution).unwrap_or_else(|e| panic!("{e}"))
+}
+
+#[test]
+fn arrays_of_other_lengths_are_refused() {
+    let robot = planar(ExecutionMode::best());
+    let function = robot.function("inverse_dynamics").expect("it was asked for");
+    let (q, mut tau) = ([0.1, 0.2], [0.0; 2]);
+    let missing = function.call(&[&q, &q], &mut [&mut tau]);
+    assert_eq!(missing, Err(CallError::Arrays { what: "inputs", expected: 3, found: 2 }));
+    let missing = function.call(&[&q, &q, &q], &mut []);
+    assert_eq!(missing, Err(CallError::Arrays { what: "results", expected: 1, found: 0 }));
+    let short = function.call(&[&q, &q[..1], &q], &mut [&mut tau]).expect_err("it is too short");
+    assert_eq!(short.to_string(), "`qd` has 1 numbers, the function takes 2");
+    let long = function.call(&[&q, &q, &q], &mut [&mut [0.0; 3]]).expect_err("it is too long");
+    assert_eq!(long.to_string(), "`tau` has 3 numbers, the function takes 2");
+    let rows = BatchLayout::states_of(2);
+    let inputs: [(&[f64], BatchLayout); 3] = [(&[0.0; 20], rows), (&[0.0; 20], rows), (&[0.0; 19], rows)];
+    let short = function.batch(10, &inputs, &mut [(&mut [0.0; 20], rows)]).expect_err("it is too short");
+    assert_eq!(short, CallError::Length { name: "qdd".to_string(), expected: 20, found: 19 });
+    let all: [(&[f64], BatchLayout); 3] = [(&[0.0; 20], rows); 3];
+    let over = BatchLayout { by_state: 1, by_entry: 1 };
+    let overlap = function.batch(10, &all, &mut [(&mut [0.0; 20], over)]).expect_err("results overlap");
+    assert!(matches!(overlap, CallError::Overlap { .. }), "{overlap}");
+    let huge = BatchLayout { by_state: usize::MAX, by_entry: 2 };
+    assert!(matches!(function.batch(10, &all, &mut [(&mut [0.0; 20], huge)]), Err(CallError::Length { .. })));
+}
+
+#[test]
+fn an_unknown_function_is_told_with_those_that_there_are() {
+    let robot = planar(ExecutionMode::best());
+    let unknown = robot.function("forward_dynamics").expect_err("it was not asked for");
+    assert_eq!(
+        unknown.to_string(),
+        "there is no function `forward_dynamics`\nhelp: the robot was loaded with inverse_dynamics, mass_matrix"
+    );
+}
+
+#[test]
+fn wrong_robots_and_options_for_texts_are_refused() {
+    let wrong = Robot::<f64>::load(&Source::new("r.toml", "[robot]\nname = 3\n"), &Options::default());
+    let Err(LoadError::Wrong(said)) = wrong else { panic!("it is no robot") };
+    assert!(said.has_errors());
+    let mut scene = Scene::default();
+    scene.ranges.qd = JointRanges::All(InputRange::within(0.5));
+    scene.ranges.qdd = JointRanges::All(InputRange::within(1.0));
+    let budget = Budget { max_error: Some(MaxError::All(1e-6)), mixed_precision: true, ..Budget::default() };
+    scene.budgets.insert(Function::InverseDynamics, budget);
+    let functions = vec![Function::InverseDynamics];
+    let mixed = Options { functions, scalar: Scalar::F32, scene, ..Options::default() };
+    let refused = Robot::<f32>::load(&Source::new("planar2r.toml", PLANAR), &mixed).expect_err("it is in two formats");
+    let why = "the option `mixed_precision` is not supported by machine code\nhelp: ";
+    assert!(refused.to_string().starts_with(why), "{refused}");
+}
+
+/// Rows, columns, and numbers between others; as many states as fill vectors and as do not; none.
+#[test]
+fn batches_have_the_bits_of_single_calls_in_every_layout() {
+    for execution in ExecutionMode::ALL {
+        let robot = planar(execution);
+        let function = robot.function("mass_matrix").expect("it was asked for");
+        for states in [0, 1, 2, 3, 4, 5, 7, 8, 9, 33] {
+            let layouts = |entries: usize| {
+                let apart = BatchLayout { by_state: entries * 3 + 1, by_entry: 2 };
+                [BatchLayout::states_of(entries), BatchLayout::entries_of(states), apart]
+            };
+            let length = 40 * (4 * 3 + 1);
+            for (from, to) in layouts(2).into_iter().flat_map(|from| layouts(4).map(|to| (from, to))) {
+                let q: Vec<f64> = (0..length).map(|k| (k as f64 * 0.37).sin() * 3.0).collect();
+                let mut h = vec![f64::NAN; length];
+                function.batch(states, &[(&q, from)], &mut [(&mut h, to)]).unwrap_or_else(|e| panic!("{e}"));
+                let mut written = vec![false; length];
+                for i in 0..states {
+                    let own = [0, 1].map(|k| q[i * from.by_state + k * from.by_entry]);
+                    let mut one = [0.0; 4];
+                    function.call(&[&own], &mut [&mut one]).unwrap_or_else(|e| panic!("{e}"));
+                    for (k, x) in one.iter().enumerate() {
+                        let at = i * to.by_state + k * to.by_entry;
+                        assert_eq!(h[at].to_bits(), x.to_bits(), "{execution:?}, {states} states, {from:?}, {to:?}");
+                        written[at] = true;
+                    }
+                }
+                let is_left = |(h, written): (&f64, &bool)| *written || h.is_nan();
+                assert!(h.iter().zip(&written).all(is_left), "nothing else is written");
+            }
+        }
+    }
+}

@@ -1,0 +1,6 @@
+//! Machine code beside the interpreter and beside the graph that both come from.
+
+mod allocation;
+mod bits;
+mod calls;
+mod encoding;
