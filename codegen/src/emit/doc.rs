@@ -66,6 +66,21 @@ pub(super) fn of_entries(function: Function, entries: &[NonzeroEntries], options
     doc
 }
 
+/// A sentence behind others on what joints add to forces without a column in the regressor.
+pub(super) fn of_no_column(left_out: &[(&str, Vec<String>)]) -> String {
+    let of_joints = |(word, joints): &(&str, Vec<String>)| {
+        let joints: Vec<String> = joints.iter().map(|joint| identifier::doc(joint)).collect();
+        format!("`{word}` of {}", joints.join(", "))
+    };
+    match left_out {
+        [] => String::new(),
+        all => {
+            let all = all.iter().map(of_joints).collect::<Vec<_>>().join("; ");
+            format!(" Y β is without what has no column: {all}. `[regressor]` in a scene gives it columns.")
+        }
+    }
+}
+
 /// What is said above a function of a contact mode.
 pub(super) fn of_contact(function: ContactFunction, (mode, scene): (&Mode, &Scene), ports: &Graph) -> String {
     let summary = function.summary();

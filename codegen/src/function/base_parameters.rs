@@ -5,7 +5,6 @@
 //! o and k of the joint.
 
 use super::{Extent, Function};
-use crate::identifier;
 use std::fmt::Write;
 use straightline_core::base_parameters::{BaseParameter, JointParameter, PER_BODY};
 use straightline_core::model::Model;
@@ -24,8 +23,8 @@ pub struct BaseParameterList {
     pub names: Vec<String>,
     /// Their values for the robot, without what a scene makes an input.
     pub values: Vec<f64>,
-    /// What joints add to forces without a column: a sentence behind others, with the names of the joints; empty where there is nothing.
-    pub left_out: String,
+    /// What joints add to forces without a column, by its word in scenes, with the names of the joints.
+    pub left_out: Vec<(&'static str, Vec<String>)>,
     /// Rows and columns of the entries of the regressor that are not zero everywhere, column by column.
     pub places: Vec<[usize; 2]>,
 }
@@ -38,7 +37,7 @@ pub fn base_parameter_lists(model: &Model<Dd>, functions: &[Function]) -> Vec<Ba
         what,
         names: parameters.iter().map(|parameter| name(model, parameter)).collect(),
         values: parameters.iter().map(|parameter| parameter.value(&of).to_f64()).collect(),
-        left_out: String::new(),
+        left_out: Vec::new(),
         places: parameters.iter().enumerate().flat_map(|(k, p)| p.rows.iter().map(move |row| [*row, k])).collect(),
     };
     let is_wanted = |extents: &[Extent]| functions.iter().any(|f| extents.iter().any(|extent| f.has_axis(*extent)));
@@ -87,26 +86,17 @@ fn name(model: &Model<Dd>, parameter: &BaseParameter) -> String {
     out
 }
 
-/// What joints add to generalized forces without a column.
-fn left_out(model: &Model<Dd>) -> String {
+/// What joints add to generalized forces without a column, by its word in scenes, with the names of the joints.
+fn left_out(model: &Model<Dd>) -> Vec<(&'static str, Vec<String>)> {
     let mut bodies: Vec<_> = model.bodies.iter().collect();
     bodies.sort_by_key(|body| body.joint.iv);
     let columns = &model.base_parameters.joint_parameters;
+    let joints_with = |kind: JointParameter| -> Vec<String> {
+        let with = bodies.iter().filter(|body| kind.value(&body.effects).to_f64() != 0.0);
+        with.map(|body| body.joint.name.clone()).collect()
+    };
     let kinds = JointParameter::EVERY.into_iter().filter(|kind| !columns.contains(kind));
-    let of_kinds: Vec<String> = kinds
-        .filter_map(|kind| {
-            let with = bodies.iter().filter(|body| kind.value(&body.effects).to_f64() != 0.0);
-            let joints: Vec<String> = with.map(|body| identifier::doc(&body.joint.name)).collect();
-            (!joints.is_empty()).then(|| format!("`{}` of {}", kind.word(), joints.join(", ")))
-        })
-        .collect();
-    match of_kinds.is_empty() {
-        true => String::new(),
-        false => {
-            let all = of_kinds.join("; ");
-            format!(" Y β is without what has no column: {all}. `[regressor]` in a scene gives it columns.")
-        }
-    }
+    kinds.map(|kind| (kind.word(), joints_with(kind))).filter(|(_, joints)| !joints.is_empty()).collect()
 }
 
 /// A factor to four digits.

@@ -2,7 +2,7 @@
 
 use super::c_comment;
 use super::interface::{CParameter, Exported, Interface, LAYOUTS};
-use crate::emit::doc::relinked;
+use crate::emit::doc::{of_no_column, relinked};
 use crate::function::base_parameter_lists;
 use std::fmt::Write;
 use straightline_core::model::Model;
@@ -65,7 +65,7 @@ impl Interface<'_> {
                 let _ = writeln!(out, " *   {i:>3}  {} = {value:e}", c_comment(name));
             }
             if !list.left_out.is_empty() {
-                let _ = writeln!(out, " *{}", c_comment(&list.left_out));
+                let _ = writeln!(out, " *{}", c_comment(&of_no_column(&list.left_out)));
             }
         }
         out.push_str(" * Frames:\n");

@@ -2,6 +2,7 @@
 
 use super::{number, ALLOW};
 use crate::choices::Choice;
+use crate::emit::doc::of_no_column;
 use crate::emit::Generated;
 use crate::function::{base_parameter_lists, BaseParameterList, Function};
 use crate::identifier::{comment, string_literals};
@@ -197,7 +198,10 @@ fn of_base_parameters(generated: &Generated) -> Vec<AssociatedConstant> {
             format!("{prefix}_PARAMETERS"),
             ConstantType::Numbers(generated.scalar, vec![n]),
             format!("[{}]", numbers.join(", ")),
-            format!("Their values \\[kg, kg·m, kg·m²; of joints as their parameters\\], without bodies that are inputs.{left_out}"),
+            format!(
+                "Their values \\[kg, kg·m, kg·m²; of joints as their parameters\\], without bodies that are inputs.{}",
+                of_no_column(&left_out)
+            ),
         );
         constants.extend([size, names, values]);
         for (k, word) in ["ROWS", "COLUMNS"].into_iter().enumerate() {
