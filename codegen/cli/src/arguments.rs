@@ -14,6 +14,7 @@ use straightline_codegen::options::table::OptionGroup;
 use straightline_codegen::options::GivenOptions;
 use straightline_codegen::Function;
 
+pub use crate::bench::Bench;
 pub use crate::motion::{Analyze, Simulate};
 
 pub const EXIT_CODES: &str = "\
@@ -87,15 +88,7 @@ Examples:
 {EXIT_CODES}"))]
     Verify(Verify),
     /// Measure every function on this machine, by machine code that is made at once: rustc is not needed
-    #[command(after_help = format!("\
-Times are of machine code with the bits of generated Rust, in nanoseconds: of a call, and per state of a batch on one
-thread. Errors are those of `verify`.
-
-Examples:
-  straightline bench panda.urdf
-  straightline bench solo12.urdf --floating-base --scalar f32 --function inverse_dynamics --json
-
-{EXIT_CODES}"))]
+    #[command(after_help = crate::bench::help())]
     Bench(Bench),
     /// Simulate a robot under torques or a controller
     #[command(after_help = format!("\
@@ -264,25 +257,6 @@ pub struct Verify {
     #[arg(long, value_name = "S", default_value_t = 1)]
     pub seed: u64,
     /// As JSON: {"robot": …, "bound": …, "functions": {"inverse_dynamics": {"error": …, "state": …}}}
-    #[arg(long)]
-    pub json: bool,
-    #[command(flatten)]
-    pub program: ProgramArgs,
-    #[command(flatten)]
-    pub model: ModelArgs,
-}
-
-#[derive(Debug, Args)]
-pub struct Bench {
-    #[arg(help = robot_file())]
-    pub robot: PathBuf,
-    /// Number of random states that errors are the worst of
-    #[arg(long, value_name = "N", default_value_t = 20, value_parser = clap::value_parser!(u32).range(1..))]
-    pub states: u32,
-    /// Seed of the random states
-    #[arg(long, value_name = "S", default_value_t = 1)]
-    pub seed: u64,
-    /// As JSON: {"robot": …, "execution": …, "functions": {"inverse_dynamics": {"nanoseconds_per_call": …}}}
     #[arg(long)]
     pub json: bool,
     #[command(flatten)]

@@ -1,10 +1,13 @@
 //! What the functions of a robot take on this machine, by machine code that is made for it: no rustc is needed.
 
-use crate::arguments::Bench;
+use crate::arguments::{robot_file, ModelArgs, ProgramArgs, EXIT_CODES};
+use crate::table::FunctionTable;
 use crate::{compiled, files, print, CommandFailure};
+use clap::Args;
 use serde::Serialize;
 use std::collections::BTreeMap;
 use std::hint::black_box;
+use std::path::PathBuf;
 use std::time::Instant;
 use straightline_codegen::model::states::random_inputs;
 use straightline_codegen::verify::{self, Verification};
@@ -17,6 +20,40 @@ const STATES: usize = 4096;
 /// A measurement takes so long \[s\], and is the best of so many.
 const SECONDS: f64 = 0.02;
 const REPEATS: usize = 5;
+
+/// What stands below the help of the command.
+pub fn help() -> String {
+    format!(
+        "\
+Times are of machine code with the bits of generated Rust, in nanoseconds: of a call, and per state of a batch on one
+thread. Errors are those of `verify`.
+
+Examples:
+  straightline bench panda.urdf
+  straightline bench solo12.urdf --floating-base --scalar f32 --function inverse_dynamics --json
+
+{EXIT_CODES}"
+    )
+}
+
+#[derive(Debug, Args)]
+pub struct Bench {
+    #[arg(help = robot_file())]
+    pub robot: PathBuf,
+    /// Number of random states that errors are the worst of
+    #[arg(long, value_name = "N", default_value_t = 20, value_parser = clap::value_parser!(u32).range(1..))]
+    pub states: u32,
+    /// Seed of the random states
+    #[arg(long, value_name = "S", default_value_t = 1)]
+    pub seed: u64,
+    /// As JSON: {"robot": …, "execution": …, "functions": {"inverse_dynamics": {"nanoseconds_per_call": …}}}
+    #[arg(long)]
+    pub json: bool,
+    #[command(flatten)]
+    pub program: ProgramArgs,
+    #[command(flatten)]
+    pub model: ModelArgs,
+}
 
 /// What was found.
 #[derive(Serialize)]
@@ -131,7 +168,7 @@ fn nanoseconds(mut run: impl FnMut()) -> f64 {
 
 fn print_report(report: &BenchReport) -> std::io::Result<()> {
     let BenchReport { robot, scalar, execution, bound, functions } = report;
-    let mut table = print::Table::new(&format!("{robot}: {scalar}, {execution}"), functions.keys())?;
+    let mut table = FunctionTable::new(&format!("{robot}: {scalar}, {execution}"), functions.keys())?;
     table.row("function", &["operations", "sincos", "ns/call", "ns/state", "bytes", "error"])?;
     for (name, f) in functions {
         let error = f.error.map_or("-".to_string(), |error| format!("{error:.1e}"));

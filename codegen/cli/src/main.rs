@@ -25,6 +25,7 @@ mod page;
 mod print;
 #[cfg(feature = "simulation")]
 mod search;
+mod table;
 
 use arguments::{
     CheckArguments, CliCommand, CommandLine, Export, Generate, ModelArgs, ProgramArgs, ReportArguments, Verify,

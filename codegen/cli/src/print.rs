@@ -1,5 +1,6 @@
 //! What the person sees.
 
+use crate::table::name_width;
 use crate::CommandFailure;
 use anstream::{eprintln, stdout};
 use anstyle::{AnsiColor, Style};
@@ -15,7 +16,7 @@ use straightline_codegen::diagnostic::codes::Code;
 use straightline_codegen::diagnostic::{Diagnostics, Severity};
 use straightline_codegen::expr::Counts;
 use straightline_codegen::model::{tolerance_that_mends, DoubtfulAngle, SpecialAngle};
-use straightline_codegen::program::staged::{Remaining, StageReport};
+use straightline_codegen::program::staged::{Remaining, StageReport, StagedReport};
 use straightline_codegen::report::errors::four_digits;
 use straightline_codegen::report::waterfall::{signed, Waterfall};
 use straightline_codegen::report::Report;
@@ -130,12 +131,6 @@ pub fn codes(codes: &[Code]) -> io::Result<()> {
     Ok(())
 }
 
-/// How wide the column of these names is, with the space behind it.
-fn name_width(names: impl IntoIterator<Item = impl AsRef<str>>) -> usize {
-    let longest = names.into_iter().map(|name| name.as_ref().chars().count()).max().unwrap_or(0);
-    20.max(longest + 2)
-}
-
 /// The functions that a word is about, or all of them.
 pub fn functions(word: Option<&str>) -> io::Result<()> {
     let mut out = stdout().lock();
@@ -223,6 +218,28 @@ pub fn notes(description: &Description, angles: &[SpecialAngle], doubtful: &[Dou
     Ok(())
 }
 
+/// The operations of the staged form.
+fn staged_report(out: &mut impl Write, staged: &StagedReport, width: usize) -> io::Result<()> {
+    let [of_stage, of_rest] = ["stage ", "then "].map(|word| width - word.len());
+    writeln!(out)?;
+    for s in &staged.stages {
+        let StageReport { name, mul, add, div, sqrt, sincos, stored } = s;
+        writeln!(
+            out,
+            "stage {name:<of_stage$}{mul:>8}{add:>8}{:>8}{div:>6}{sqrt:>6}{sincos:>8}, stores {stored} values",
+            ""
+        )?;
+    }
+    for (name, Remaining { mul, add, div, sqrt }) in &staged.remaining {
+        writeln!(out, "then {name:<of_rest$}{mul:>8}{add:>8}{:>8}{div:>6}{sqrt:>6}", "")?;
+    }
+    let stored = [("inverse", staged.inverse_dynamics), ("forward", staged.forward_dynamics)];
+    for (what, stored) in stored.into_iter().filter_map(|(what, stored)| Some((what, stored?))) {
+        writeln!(out, "stored for {what} dynamics: {stored}")?;
+    }
+    Ok(())
+}
+
 /// The operations of every function.
 pub fn report(report: &Report) -> io::Result<()> {
     let mut out = stdout().lock();
@@ -248,23 +265,7 @@ pub fn report(report: &Report) -> io::Result<()> {
         writeln!(out, "{start}{name:<40}{mul:>8}{add:>8}{fma:>8}{div:>6}{sqrt:>6}{sin_cos:>8}")?;
     }
     if let Some(staged) = &report.staged {
-        let [of_stage, of_rest] = ["stage ", "then "].map(|word| width - word.len());
-        writeln!(out)?;
-        for s in &staged.stages {
-            let StageReport { name, mul, add, div, sqrt, sincos, stored } = s;
-            writeln!(
-                out,
-                "stage {name:<of_stage$}{mul:>8}{add:>8}{:>8}{div:>6}{sqrt:>6}{sincos:>8}, stores {stored} values",
-                ""
-            )?;
-        }
-        for (name, Remaining { mul, add, div, sqrt }) in &staged.remaining {
-            writeln!(out, "then {name:<of_rest$}{mul:>8}{add:>8}{:>8}{div:>6}{sqrt:>6}", "")?;
-        }
-        let stored = [("inverse", staged.inverse_dynamics), ("forward", staged.forward_dynamics)];
-        for (what, stored) in stored.into_iter().filter_map(|(what, stored)| Some((what, stored?))) {
-            writeln!(out, "stored for {what} dynamics: {stored}")?;
-        }
+        staged_report(&mut out, staged, width)?;
     }
     writeln!(
         out,
@@ -304,32 +305,6 @@ pub fn report(report: &Report) -> io::Result<()> {
         }
     }
     Ok(())
-}
-
-/// Figures of functions, one per line.
-pub struct Table {
-    out: anstream::Stdout,
-    width: usize,
-}
-
-impl Table {
-    /// Under this title, of these functions.
-    pub fn new(title: &str, functions: impl IntoIterator<Item = impl AsRef<str>>) -> io::Result<Table> {
-        let mut out = stdout();
-        writeln!(out, "{title}\n")?;
-        Ok(Table { out, width: name_width(functions) })
-    }
-
-    /// A line of it: what the columns are, or the figures of a function.
-    pub fn row(&mut self, name: &str, columns: &[impl AsRef<str>]) -> io::Result<()> {
-        let columns: String = columns.iter().map(|column| format!("{:>12}", column.as_ref())).collect();
-        writeln!(self.out, "{name:<width$}{columns}", width = self.width)
-    }
-
-    /// What is said below it.
-    pub fn foot(mut self, text: &str) -> io::Result<()> {
-        writeln!(self.out, "\n{text}")
-    }
 }
 
 /// The worst error of every function.
