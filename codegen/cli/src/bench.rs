@@ -2,7 +2,7 @@
 
 use crate::arguments::{robot_file, ModelArgs, ProgramArgs, EXIT_CODES};
 use crate::table::FunctionTable;
-use crate::{compiled, files, print, CommandFailure};
+use crate::{compiled, files, print, verified, CommandFailure};
 use clap::Args;
 use serde::Serialize;
 use std::collections::BTreeMap;
@@ -10,7 +10,7 @@ use std::hint::black_box;
 use std::path::PathBuf;
 use std::time::Instant;
 use straightline_codegen::model::states::random_inputs;
-use straightline_codegen::verify::{self, Verification};
+use straightline_codegen::verify::Verification;
 use straightline_core::Dd;
 use straightline_graph::in_scalar;
 use straightline_jit::{BatchLayout, LoadError, LoadedFunction, Number, Robot};
@@ -82,12 +82,9 @@ struct FunctionTimes {
 
 /// Prints what functions take.
 pub fn bench(a: &Bench) -> Result<(), CommandFailure> {
-    let (generated, options) = compiled(&a.robot, &a.program, &a.model)?;
-    let source = files::read(&a.robot)?;
-    let progress = print::bar("verifying", a.states.into());
-    let verified = verify::verify(&source, &generated, &options, (a.states, a.seed), || progress.inc(1));
-    progress.finish_and_clear();
-    let verification = verified.map_err(|what| print::failure(format!("{}: {what}", source.path())))?;
+    let compiled = compiled(&a.robot, &a.program, &a.model)?;
+    let verification = verified(&a.robot, &compiled, (a.states, a.seed))?;
+    let (source, (_, options)) = (files::read(&a.robot)?, compiled);
     let report = in_scalar!(options.scalar, T => {
         let robot = Robot::<T>::load(&source, &options).map_err(|wrong| match wrong {
             LoadError::Wrong(diagnostics) => print::refused(&diagnostics),

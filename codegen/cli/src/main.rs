@@ -42,7 +42,8 @@ use straightline_codegen::emit::package::PACKAGES;
 use straightline_codegen::emit::rust::c_package::C_ABI;
 use straightline_codegen::emit::Generated;
 use straightline_codegen::options::{check_options, scene_file, Options, SceneFile};
-use straightline_codegen::{description, identifier, model, output, scene, verify};
+use straightline_codegen::verify::{self, Verification};
+use straightline_codegen::{description, identifier, model, output, scene};
 
 /// Why a command ended early; what there is to say was said where it happened, except for [`CommandFailure::Files`].
 enum CommandFailure {
@@ -189,13 +190,22 @@ fn check(a: &CheckArguments) -> Result<(), CommandFailure> {
     }
 }
 
-fn verify(a: &Verify) -> Result<(), CommandFailure> {
-    let (generated, options) = compiled(&a.robot, &a.program, &a.model)?;
-    let source = read(&a.robot)?;
-    let progress = print::bar("verifying", a.states.into());
-    let verified = verify::verify(&source, &generated, &options, (a.states, a.seed), || progress.inc(1));
+/// Compares the programs of a robot with the second author in so many states from this seed.
+fn verified(
+    robot: &Path,
+    (generated, options): &(Generated, Options),
+    (states, seed): (u32, u64),
+) -> Result<Verification, CommandFailure> {
+    let source = read(robot)?;
+    let progress = print::bar("verifying", states.into());
+    let verified = verify::verify(&source, generated, options, (states, seed), || progress.inc(1));
     progress.finish_and_clear();
-    let verification = verified.map_err(|what| print::failure(format!("{}: {what}", source.path())))?;
+    verified.map_err(|what| print::failure(format!("{}: {what}", source.path())))
+}
+
+fn verify(a: &Verify) -> Result<(), CommandFailure> {
+    let compiled = compiled(&a.robot, &a.program, &a.model)?;
+    let verification = verified(&a.robot, &compiled, (a.states, a.seed))?;
     if a.json { print::json(&verification) } else { print::verification(&verification) }?;
     match verification.failure() {
         None => Ok(()),
