@@ -26,7 +26,7 @@
 //! let mut torque = [0.0];
 //! gravity.call(&[&[0.5]], &mut [&mut torque]).unwrap();
 //! // m g l sin q
-//! assert!((torque[0] - 2.0 * 9.80665 * 0.5 * f64::sin(0.5)).abs() < 1e-3);
+//! assert!((torque[0] - 2.0 * 9.81 * 0.5 * f64::sin(0.5)).abs() < 1e-3);
 //! ```
 
 pub mod allocation;
