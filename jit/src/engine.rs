@@ -3,7 +3,7 @@
 use crate::allocation::{AllocatedProgram, MemoryPlace};
 use crate::between::PlacedCalls;
 use crate::interpreter;
-use crate::machine::x86::{self, Format, HostInstructions, SIGNS};
+use crate::machine::{Format, HostInstructions, SIGNS};
 use crate::native::{NativeCode, SineInstructions};
 use crate::number::Number;
 use crate::tape::{Phase, ProgramTape};
@@ -12,8 +12,8 @@ use std::{fmt, io};
 /// How functions are executed.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum ExecutionMode {
-    /// By these instructions of x86-64.
-    X86(HostInstructions),
+    /// By these instructions.
+    Native(HostInstructions),
     /// Step by step.
     Interpreted,
 }
@@ -21,9 +21,7 @@ pub enum ExecutionMode {
 impl fmt::Display for ExecutionMode {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.write_str(match self {
-            ExecutionMode::X86(HostInstructions::Sse2) => "machine code of x86-64",
-            ExecutionMode::X86(HostInstructions::Avx) => "machine code of x86-64 with AVX",
-            ExecutionMode::X86(HostInstructions::Avx512) => "machine code of x86-64 with AVX-512",
+            ExecutionMode::Native(set) => set.row().name,
             ExecutionMode::Interpreted => "interpreted",
         })
     }
@@ -31,12 +29,16 @@ impl fmt::Display for ExecutionMode {
 
 impl ExecutionMode {
     /// All, the fastest first.
-    pub const ALL: [ExecutionMode; 4] = [
-        ExecutionMode::X86(HostInstructions::Avx512),
-        ExecutionMode::X86(HostInstructions::Avx),
-        ExecutionMode::X86(HostInstructions::Sse2),
-        ExecutionMode::Interpreted,
-    ];
+    pub const ALL: [ExecutionMode; 5] = {
+        let [first, second, third, fourth] = HostInstructions::ALL;
+        [
+            ExecutionMode::Native(first),
+            ExecutionMode::Native(second),
+            ExecutionMode::Native(third),
+            ExecutionMode::Native(fourth),
+            ExecutionMode::Interpreted,
+        ]
+    };
 
     /// The fastest that this machine has.
     pub fn best() -> ExecutionMode {
@@ -46,17 +48,8 @@ impl ExecutionMode {
     /// Whether this machine has it.
     pub fn is_available(self) -> bool {
         match self {
+            ExecutionMode::Native(set) => (set.row().is_here)(),
             ExecutionMode::Interpreted => true,
-            #[cfg(target_arch = "x86_64")]
-            ExecutionMode::X86(HostInstructions::Sse2) => true,
-            #[cfg(target_arch = "x86_64")]
-            ExecutionMode::X86(HostInstructions::Avx) => std::arch::is_x86_feature_detected!("avx"),
-            #[cfg(target_arch = "x86_64")]
-            ExecutionMode::X86(HostInstructions::Avx512) => {
-                std::arch::is_x86_feature_detected!("avx512f") && std::arch::is_x86_feature_detected!("avx512vl")
-            }
-            #[cfg(not(target_arch = "x86_64"))]
-            ExecutionMode::X86(_) => false,
         }
     }
 }
@@ -82,13 +75,13 @@ impl<T: Number> Executable<T> {
     /// The same in pages that come from there.
     fn in_pages(tape: ProgramTape<T>, execution: ExecutionMode, pages: Pages) -> Executable<T> {
         let code = match execution {
-            ExecutionMode::X86(set) if execution.is_available() && (!tape.fused || set.fuses()) => {
-                let allocated = AllocatedProgram::new(&tape, set.registers());
+            ExecutionMode::Native(set) if execution.is_available() && (!tape.fused || (set.row().fuses)()) => {
+                let allocated = AllocatedProgram::new(&tape, set.row().registers);
                 let format = |is_vector| Format { set, bytes: T::BYTES, is_vector };
                 let code = |is_vector| MachineCode::new(&tape, &allocated, format(is_vector), pages).ok();
                 code(false).zip(code(true)).map(|(one, several)| [one, several])
             }
-            ExecutionMode::X86(_) | ExecutionMode::Interpreted => None,
+            ExecutionMode::Native(_) | ExecutionMode::Interpreted => None,
         };
         let execution = if code.is_some() { execution } else { ExecutionMode::Interpreted };
         Executable { tape, code, execution }
@@ -162,7 +155,8 @@ impl<T: Number> MachineCode<T> {
         let constants: Vec<T> = std::iter::repeat_n(T::minus_zero(), SIGNS * lanes)
             .chain(tape.constants.iter().flat_map(|c| std::iter::repeat_n(*c, lanes)))
             .collect();
-        let functions: Vec<Vec<u8>> = allocated.phases.iter().map(|phase| x86::function(phase, format)).collect();
+        let function = format.set.row().function;
+        let functions: Vec<Vec<u8>> = allocated.phases.iter().map(|phase| function(phase, format)).collect();
         let frame_length = allocated.cells * lanes;
         let placed = |phase: &Phase| (PlacedCalls::new(&phase.calls, allocated), !phase.steps.is_empty());
         let phases = tape.phases.iter().map(placed).collect();

@@ -1,9 +1,9 @@
 //! Robot dynamics by machine code that is made at run time.
 //!
 //! A [`Robot`] is loaded from the text of its file, as the compiler loads it. Its functions are then executed without rustc: the checked program of
-//! the compiler becomes a [tape](tape::ProgramTape), and that the instructions of this machine ([`machine`]), or, where there are none for it or pages cannot be
-//! made executable, what an [interpreter] runs. All of them compute
-//! the bits of the program's graph, evaluated node by node, but for the payloads of NaN (`tests/suite/bits.rs`).
+//! the compiler becomes a [tape](tape::ProgramTape), and that the instructions of this machine ([`machine`]: x86-64 by SSE2, AVX or AVX-512, aarch64 by NEON), or, where there
+//! are none for it or pages cannot be made executable, what an [interpreter] runs. All of them compute
+//! the bits of the program's graph, evaluated node by node, but for the payloads of NaN (`tests/suite/bits.rs`, and for aarch64 on other machines, emulated, `tests/suite/emulated.rs`).
 //!
 //! ```
 //! use straightline_codegen::diagnostic::Source;

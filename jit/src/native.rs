@@ -5,11 +5,13 @@
 //! never both. A function returns to where it was called from, keeps no address and touches nothing else.
 
 use crate::interpreter;
+#[cfg(target_arch = "x86_64")]
+use crate::machine::x86_has;
 use crate::number::Number;
 use memmap2::{Mmap, MmapMut};
 use std::io;
 
-/// What is written: see [`x86`](crate::machine::x86). Elsewhere there is none.
+/// What is written: see [`x86`](crate::machine::x86) and [`aarch64`](crate::machine::aarch64). Elsewhere there is none.
 #[cfg(target_arch = "x86_64")]
 type Function<T> = extern "sysv64" fn(*mut T, *const T);
 #[cfg(not(target_arch = "x86_64"))]
@@ -40,7 +42,9 @@ impl NativeCode {
             pages[at..at + function.len()].copy_from_slice(function);
             at += function.len();
         }
-        Ok(NativeCode { pages: pages.make_exec()?, starts, lengths })
+        let pages = pages.make_exec()?;
+        publish(&pages);
+        Ok(NativeCode { pages, starts, lengths })
     }
 
     /// How many bytes there are.
@@ -56,12 +60,36 @@ impl NativeCode {
     pub fn run<T>(&self, phase: usize, frame: &mut [T], constants: &[T]) {
         assert!(frame.len() >= self.lengths[0] && constants.len() >= self.lengths[1], "as long as it was made for");
         let start = self.pages[self.starts[phase]..].as_ptr();
-        // SAFETY: `start` is the beginning of a function that `machine::x86::function` wrote for this ABI, in pages that live as long as `self`. It
+        // SAFETY: `start` is the beginning of a function that this machine's row of `machine` wrote for this ABI, in pages that live as long as `self`. It
         // touches `lengths` numbers of frame and constants at most, which are there, and changes those of the frame alone.
         unsafe {
             let function: Function<T> = std::mem::transmute(start);
             function(frame.as_mut_ptr(), constants.as_ptr());
         }
+    }
+}
+
+/// What was written is what is fetched: machines see to that themselves, but for those of the function below.
+#[cfg(not(target_arch = "aarch64"))]
+fn publish(_: &[u8]) {}
+
+/// What was written is what is fetched from now on: lines of the data cache go to where it meets that of instructions, which forgets those that it has (Arm
+/// Architecture Reference Manual, "Caches and memory hierarchy": synchronization and coherency between data and instruction accesses).
+#[cfg(target_arch = "aarch64")]
+fn publish(code: &[u8]) {
+    use std::arch::asm;
+    let start = code.as_ptr() as usize;
+    let lines = |length: usize| (start & !(length - 1)..start + code.len()).step_by(length);
+    let types: usize;
+    // SAFETY: what programs may do on this machine under the systems that `machine` calls it on; no memory is changed
+    unsafe {
+        asm!("mrs {}, ctr_el0", out(reg) types, options(nomem, nostack, preserves_flags));
+        // the shortest lines, as powers of two of words
+        let [of_instructions, of_data] = [0, 16].map(|field| 4 << (types >> field & 15));
+        lines(of_data).for_each(|line| asm!("dc cvau, {}", in(reg) line, options(nostack, preserves_flags)));
+        asm!("dsb ish", options(nostack, preserves_flags));
+        lines(of_instructions).for_each(|line| asm!("ic ivau, {}", in(reg) line, options(nostack, preserves_flags)));
+        asm!("dsb ish", "isb", options(nostack, preserves_flags));
     }
 }
 
@@ -85,10 +113,8 @@ impl SineInstructions {
     /// The fastest that this machine has.
     pub fn best() -> SineInstructions {
         #[cfg(target_arch = "x86_64")]
-        if is_x86_feature_detected!("avx2") && is_x86_feature_detected!("fma") {
-            let is_wide = is_x86_feature_detected!("avx512f")
-                && is_x86_feature_detected!("avx512vl")
-                && is_x86_feature_detected!("avx512dq");
+        if x86_has!("avx2" "fma") {
+            let is_wide = x86_has!("avx512f" "avx512vl" "avx512dq");
             return SineInstructions(if is_wide { SineTarget::Avx512 } else { SineTarget::Avx2 });
         }
         SineInstructions::ANY

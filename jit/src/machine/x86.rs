@@ -3,58 +3,14 @@
 //!
 //! A function takes the address of its frame in `rdi` and that of its constants in `rsi`, as the System V ABI has it, and uses all vector registers, which belong to whoever is called.
 
+use super::{Format, HostInstructions, SIGNS};
 use crate::allocation::{FusedForm, Instruction, MemoryPlace, ReadFrom};
 use straightline_graph::expr::Binary;
 
-/// Instructions that come together.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
-pub enum HostInstructions {
-    /// What every x86-64 has.
-    Sse2,
-    /// Instructions of three operands, vectors of 32 bytes.
-    Avx,
-    /// Twice the registers, vectors of 64 bytes.
-    Avx512,
-}
-
-impl HostInstructions {
-    /// Registers of numbers. Instructions of two operands take one on the way.
-    pub fn registers(self) -> usize {
-        match self {
-            HostInstructions::Sse2 => usize::from(ON_THE_WAY),
-            HostInstructions::Avx => 16,
-            HostInstructions::Avx512 => 32,
-        }
-    }
-
-    /// Whether this machine has products and sums in one rounding beside them.
-    pub fn fuses(self) -> bool {
-        match self {
-            HostInstructions::Sse2 => false,
-            #[cfg(target_arch = "x86_64")]
-            HostInstructions::Avx => std::arch::is_x86_feature_detected!("fma"),
-            #[cfg(not(target_arch = "x86_64"))]
-            HostInstructions::Avx => false,
-            HostInstructions::Avx512 => true,
-        }
-    }
-
-    /// Bytes of a vector.
-    fn vector(self) -> usize {
-        match self {
-            HostInstructions::Sse2 => 16,
-            HostInstructions::Avx => 32,
-            HostInstructions::Avx512 => 64,
-        }
-    }
-}
-
 /// The register that instructions of two operands take on the way.
-const ON_THE_WAY: u8 = 15;
+pub(super) const ON_THE_WAY: u8 = 15;
 const FRAME: u8 = 7;
 const CONSTANTS: u8 = 6;
-/// So many times −0 stand before the constants: what instructions on whole registers read of it.
-pub const SIGNS: usize = 4;
 const MOVE: u8 = 0x10;
 const MOVE_BACK: u8 = 0x11;
 const MOVE_WHOLE: u8 = 0x28;
@@ -67,26 +23,7 @@ const XOR_INTEGERS: u8 = 0xEF;
 const MULTIPLY_INTO_TERM: u8 = 0xB8;
 const MULTIPLY_INTO_FACTOR: u8 = 0xA8;
 
-/// Numbers of a format, alone or as many as a vector holds.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Format {
-    /// The instructions.
-    pub set: HostInstructions,
-    /// Bytes of a number: four or eight.
-    pub bytes: usize,
-    /// Whether they are vectors.
-    pub is_vector: bool,
-}
-
 impl Format {
-    /// How many states are computed at once.
-    pub fn lanes(self) -> usize {
-        match self.is_vector {
-            true => self.set.vector() / self.bytes,
-            false => 1,
-        }
-    }
-
     /// What an instruction on these numbers begins with.
     fn prefix(self) -> Prefix {
         match (self.is_vector, self.bytes) {
@@ -133,6 +70,7 @@ pub fn function(instructions: &[Instruction], format: Format) -> Vec<u8> {
         match format.set {
             HostInstructions::Sse2 => writer.of_two(*instruction),
             HostInstructions::Avx | HostInstructions::Avx512 => writer.of_three(*instruction),
+            HostInstructions::Neon => unreachable!("its functions are written by its own row"),
         }
     }
     if format.set != HostInstructions::Sse2 {

@@ -6,7 +6,7 @@ use straightline_jit::allocation::{AllocatedProgram, FusedForm, Instruction, Mem
 use straightline_jit::tape::{OperationStep, Phase, ProgramTape, TapeAction, TapeOperand};
 
 /// A tape of sums, products, roots and signs in two phases, with operands near and far.
-fn random_tape(random: &mut Random) -> ProgramTape<f64> {
+pub fn random_tape(random: &mut Random) -> ProgramTape<f64> {
     let mut below = |n: usize| ((random.unit() * n as f64) as usize).min(n - 1);
     let (inputs, constants, steps) = (1 + below(5), 1 + below(4), 4 + below(120));
     let mut phases = vec![Phase::default(), Phase::default()];

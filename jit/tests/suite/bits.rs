@@ -11,9 +11,9 @@ use straightline_graph::expr::evaluate;
 use straightline_jit::{BatchLayout, ExecutionMode, Number, Robot};
 
 /// Name, text, and whether the base floats.
-type TestFile<'a> = (&'a str, &'a str, bool);
+pub type TestFile<'a> = (&'a str, &'a str, bool);
 
-const ROBOTS: [TestFile<'static>; 4] = [
+pub const ROBOTS: [TestFile<'static>; 4] = [
     ("ur5.urdf", include_str!("../../../generated_tests/count_robots/ur5.urdf"), false),
     ("solo12.urdf", include_str!("../../../generated_tests/count_robots/solo12.urdf"), true),
     ("fourbar.toml", include_str!("../../../codegen/tests/files/fourbar.toml"), false),
@@ -21,14 +21,18 @@ const ROBOTS: [TestFile<'static>; 4] = [
 ];
 
 /// A number as it is made for tests, and as it is compared.
-trait TestNumber: Number {
+pub trait TestNumber: Number {
     fn of(x: f64) -> Self;
+    fn of_bits(bits: u64) -> Self;
     fn is_nan(self) -> bool;
 }
 
 impl TestNumber for f64 {
     fn of(x: f64) -> f64 {
         x
+    }
+    fn of_bits(bits: u64) -> f64 {
+        f64::from_bits(bits)
     }
     fn is_nan(self) -> bool {
         f64::is_nan(self)
@@ -39,21 +43,26 @@ impl TestNumber for f32 {
     fn of(x: f64) -> f32 {
         x as f32
     }
+    fn of_bits(bits: u64) -> f32 {
+        f32::from_bits(bits as u32)
+    }
     fn is_nan(self) -> bool {
         f32::is_nan(self)
     }
 }
 
+/// Numbers at the end of what there is.
+pub const ENDS: [f64; 8] = [0.0, -0.0, 5e-324, -1e-310, 1e-40, f64::INFINITY, f64::NAN, 1e300];
+
 /// Some number, now and then one at the end of what there is.
-fn any<T: TestNumber>(random: &mut Random) -> T {
-    const ENDS: [f64; 8] = [0.0, -0.0, 5e-324, -1e-310, 1e-40, f64::INFINITY, f64::NAN, 1e300];
+pub fn any<T: TestNumber>(random: &mut Random) -> T {
     match random.unit() {
         x if x < 0.03 => T::of(ENDS[((random.unit() * 8.0) as usize).min(7)]),
         _ => T::of(random.symmetric(3.0)),
     }
 }
 
-fn are_same<T: TestNumber>(found: &[T], wanted: &[T], what: &str) {
+pub fn are_same<T: TestNumber>(found: &[T], wanted: &[T], what: &str) {
     assert_eq!(found.len(), wanted.len(), "{what}");
     for (k, (found, wanted)) in found.iter().zip(wanted).enumerate() {
         let is_same = found.bits() == wanted.bits() || found.is_nan() && wanted.is_nan();
@@ -119,7 +128,7 @@ fn same_bits_of<T: TestNumber>(name: &str, compiled: &CheckedPrograms, states: u
     }
 }
 
-const DYNAMICS: [Function; 5] = [
+pub const DYNAMICS: [Function; 5] = [
     Function::InverseDynamics,
     Function::ForwardDynamics,
     Function::MassMatrix,
@@ -151,7 +160,7 @@ fn functions_with_calls_in_between_have_them_too() {
 }
 
 /// A tree of joints of all kinds that turn or slide, with numbers that are round or not.
-fn random_robot(random: &mut Random) -> String {
+pub fn random_robot(random: &mut Random) -> String {
     let mut below = |n: usize| ((random.unit() * n as f64) as usize).min(n - 1);
     let joints = 1 + below(9);
     const INERTIA: &str =

@@ -1,9 +1,10 @@
-//! Every instruction, as another program reads its bytes.
+//! Every instruction of x86-64, as another program reads its bytes.
 
 use iced_x86::{Decoder, DecoderOptions, Formatter, Instruction as Decoded, IntelFormatter, MemorySizeOptions};
 use straightline_graph::expr::Binary;
 use straightline_jit::allocation::{FusedForm, Instruction, MemoryPlace, ReadFrom};
-use straightline_jit::machine::x86::{function, Format, HostInstructions, SIGNS};
+use straightline_jit::machine::x86::function;
+use straightline_jit::machine::{Format, HostInstructions, SIGNS};
 
 const SETS: [HostInstructions; 3] = [HostInstructions::Sse2, HostInstructions::Avx, HostInstructions::Avx512];
 const FORMATS: [(usize, bool, &str); 4] = [(8, true, "pd"), (4, true, "ps"), (8, false, "sd"), (4, false, "ss")];
@@ -40,7 +41,7 @@ impl Names {
         let width = match (self.format.is_vector, self.format.set) {
             (false, _) | (_, HostInstructions::Sse2) => "x",
             (_, HostInstructions::Avx) => "y",
-            (_, HostInstructions::Avx512) => "z",
+            _ => "z",
         };
         format!("{width}mm{k}")
     }
@@ -171,14 +172,14 @@ impl Names {
 }
 
 fn places() -> Vec<MemoryPlace> {
-    let cells = [0, 1, 3, 4, 15, 16, 31, 32, 1000, 100_000].map(MemoryPlace::Cell);
-    let constants = [0, 1, 27, 28, 5000].map(MemoryPlace::Constant);
-    cells.into_iter().chain(constants).collect()
+    let cells = [0, 1, 3, 4, 15, 16, 31, 32, 1000, 4095, 4096, 65_535, 65_536, 100_000].map(MemoryPlace::Cell);
+    let constants = [0, 1, 27, 28, 4091, 4092, 5000].map(MemoryPlace::Constant);
+    cells.into_iter().chain(constants).chain([MemoryPlace::MinusZero]).collect()
 }
 
 /// All registers everywhere, and places near and far.
-fn instructions(set: HostInstructions) -> Vec<Instruction> {
-    let registers = || 0..set.registers() as u8;
+pub fn instructions(set: HostInstructions) -> Vec<Instruction> {
+    let registers = || 0..set.row().registers as u8;
     let count = registers().end;
     let mut all = Vec::new();
     for place in places() {
@@ -228,7 +229,7 @@ fn every_instruction_is_read_as_what_it_is() {
         let read = read(&function(&all, format));
         let mut wanted: Vec<String> = match set {
             HostInstructions::Sse2 => all.iter().flat_map(|one| names.of_two(*one)).collect(),
-            HostInstructions::Avx | HostInstructions::Avx512 => all.iter().map(|one| names.of_three(*one)).collect(),
+            _ => all.iter().map(|one| names.of_three(*one)).collect(),
         };
         if set != HostInstructions::Sse2 {
             wanted.push("vzeroupper".to_string());

@@ -3,4 +3,7 @@
 mod allocation;
 mod bits;
 mod calls;
+mod emulated;
+mod emulator;
 mod encoding;
+mod encoding_aarch64;
