@@ -109,6 +109,16 @@ pub enum ColumnForm {
     Lanes,
 }
 
+/// How much is tried for programs of few operations.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
+pub enum OptimisationTier {
+    /// Everything that is known to save operations.
+    #[default]
+    Full,
+    /// What takes milliseconds: one form of the robot, one method of forward dynamics.
+    Quick,
+}
+
 /// The functions over lanes and batches beside the plain ones: where the drivers of the batches come from.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum Lanes {
@@ -185,6 +195,10 @@ choices! {
         "all" Algebraic "fewest operations; rounding may differ from the generic runtime",
         "exact" Exact "the generic runtime, bit for bit",
     }
+    OptimisationTier "tier of optimisation" {
+        "full" Full "fewest operations: forms of the robot are searched",
+        "quick" Quick "milliseconds: one form of the robot, forward dynamics by articulated bodies",
+    }
     ForwardDynamicsMethod "method of forward dynamics" {
         "cheaper" Cheaper "whichever takes fewer operations for this robot",
         "articulated-body" ArticulatedBody "articulated bodies",
@@ -239,6 +253,7 @@ mod tests {
         all::<Function>();
         all::<Scalar>();
         all::<Grade>();
+        all::<OptimisationTier>();
         all::<ForwardDynamicsMethod>();
         all::<LimbForm>();
         all::<Lanes>();

@@ -21,7 +21,7 @@
 //! The build runs again when the robot file changes. Complaints name the file, the line and the column: errors end the
 //! build, warnings do not. Nothing is written outside `OUT_DIR`.
 
-use crate::choices::{ColumnForm, Fusion, Lanes, LimbForm, Memory, TargetMachine};
+use crate::choices::{ColumnForm, Fusion, Lanes, LimbForm, Memory, OptimisationTier, TargetMachine};
 use crate::compile::compile;
 use crate::diagnostic::{Diagnostic, Diagnostics, Front, Reporting, Severity, Source};
 use crate::emit::Generated;
@@ -230,6 +230,8 @@ options! {
     limbs(form: LimbForm) = form;
     /// How columns that a function solves for are computed; otherwise as lanes of loops where that takes hardly more operations.
     columns(form: ColumnForm) = form;
+    /// How much is tried for programs of few operations; otherwise everything.
+    optimise(tier: OptimisationTier) = tier;
     /// How forward dynamics is computed; otherwise the cheaper way for this robot.
     forward_dynamics(method: ForwardDynamicsMethod) = method;
     /// The machine that the code is made for; otherwise any.

@@ -12,7 +12,9 @@ pub use optimisations::{FormChoices, Optimisations};
 pub use scene_file::SceneFile;
 pub use value::{GivenOptions, OptionValue};
 
-use crate::choices::{ColumnForm, FixedProducts, Lanes, LimbForm, Memory, TargetMachine, WrittenEntries};
+use crate::choices::{
+    ColumnForm, FixedProducts, Lanes, LimbForm, Memory, OptimisationTier, TargetMachine, WrittenEntries,
+};
 use crate::description;
 use crate::description::drives::WrittenDrive;
 use crate::diagnostic::{Diagnostics, Reporting, Source};
@@ -67,6 +69,8 @@ options! {
     generic "generic": bool = false,
     /// The weakest rules allowed: with [`Grade::Exact`] the output is the generic runtime bit for bit.
     grade "rules": Grade = Grade::Algebraic,
+    /// How much is tried for programs of few operations.
+    optimise "optimise": OptimisationTier = OptimisationTier::default(),
     /// How forward dynamics is computed.
     forward_dynamics "forward_dynamics": ForwardDynamicsMethod = ForwardDynamicsMethod::default(),
     /// How identical limbs are computed.
@@ -152,20 +156,21 @@ impl Options {
     /// The optimisations that these options allow.
     pub fn optimisations(&self) -> Optimisations {
         let algebraic = self.grade == Grade::Algebraic;
+        let searches = algebraic && self.optimise == OptimisationTier::Full;
         // one method for all scenes of a robot, where bits count
-        let cheaper = algebraic && self.forward_dynamics == ForwardDynamicsMethod::Cheaper;
+        let cheaper = searches && self.forward_dynamics == ForwardDynamicsMethod::Cheaper;
         Optimisations {
             folding: algebraic,
             algebraic,
             reduced: algebraic,
             sums: algebraic,
-            chosen: algebraic,
-            forms: if algebraic { FormChoices::ALL } else { FormChoices::default() },
-            angle_sums: algebraic,
+            chosen: searches,
+            forms: if searches { FormChoices::ALL } else { FormChoices::default() },
+            angle_sums: searches,
             cheaper,
             limbs: algebraic && self.limbs != LimbForm::Apart,
             columns: algebraic && self.columns != ColumnForm::Apart,
-            substitutes: algebraic,
+            substitutes: searches,
         }
     }
 

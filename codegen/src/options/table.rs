@@ -6,7 +6,9 @@
 
 use super::value::{OptionValue, Vocabulary};
 use super::Options;
-use crate::choices::{ColumnForm, FixedProducts, Fusion, Lanes, LimbForm, Memory, TargetMachine, WrittenEntries};
+use crate::choices::{
+    ColumnForm, FixedProducts, Fusion, Lanes, LimbForm, Memory, OptimisationTier, TargetMachine, WrittenEntries,
+};
 use crate::diagnostic::Level;
 use crate::function::{ForwardDynamicsMethod, Function};
 use crate::scene::MaxError;
@@ -169,6 +171,9 @@ pub static TABLE: &[OptionRow] = &[
     OptionRow { name: "rules", kind: Word(Vocabulary::of::<Grade>(), None), default: "all", metavar: "RULES",
         doc: "Which rewrite rules may be used",
         example: &["exact"], hash: &["rules"], set: |options, value| options.grade = value.choice(), ..OF },
+    OptionRow { name: "optimise", kind: Word(Vocabulary::of::<OptimisationTier>(), None), default: "full", metavar: "TIER",
+        doc: "How much is tried for programs of few operations; another tier has other bits",
+        example: &["quick"], hash: &["optimise"], set: |options, value| options.optimise = value.choice(), ..OF },
     OptionRow { name: "forward_dynamics", kind: Word(Vocabulary::of::<ForwardDynamicsMethod>(), None), default: "cheaper", metavar: "METHOD",
         doc: "How forward dynamics is computed",
         example: &["articulated-body"], hash: &["forward_dynamics"], set: |options, value| options.forward_dynamics = value.choice(), ..OF },
