@@ -84,6 +84,7 @@ struct FunctionTimes {
 pub fn bench(a: &Bench) -> Result<(), CommandFailure> {
     let compiled = compiled(&a.robot, &a.program, &a.model)?;
     let verification = verified(&a.robot, &compiled, (a.states, a.seed))?;
+    let excess = verification.excess();
     let (source, (_, options)) = (files::read(&a.robot)?, compiled);
     let report = in_scalar!(options.scalar, T => {
         let robot = Robot::<T>::load(&source, &options).map_err(|wrong| match wrong {
@@ -95,7 +96,7 @@ pub fn bench(a: &Bench) -> Result<(), CommandFailure> {
         measured(&robot, verification)
     });
     if a.json { print::json(&report) } else { print_report(&report) }?;
-    Ok(())
+    excess.map_or(Ok(()), |why| Err(print::failure(why)))
 }
 
 fn measured<T: Number>(robot: &Robot<T>, verification: Verification) -> BenchReport {

@@ -82,6 +82,11 @@ impl Verification {
                 }
             });
         }
+        self.excess()
+    }
+
+    /// What is said where an error exceeds the bound.
+    pub fn excess(&self) -> Option<String> {
         let is_within = self.functions.values().all(|worst| worst.error <= self.bound);
         (!is_within).then(|| format!("an error exceeds the bound {:.1e}", self.bound))
     }
