@@ -6,15 +6,15 @@ use crate::number::Number;
 use crate::tape::ProgramTape;
 use std::fmt;
 use straightline_codegen::program::TracedProgram;
-use straightline_codegen::Function;
-use straightline_graph::expr::{Counts, Port};
+use straightline_graph::expr::{Counts, Graph, Port, Sines};
+use straightline_graph::schedule::{schedule, Schedule, ScheduleLimits};
 
 /// A function of a robot that can be called.
 ///
 /// Inputs and results are those of the generated function of this name, in its order and units; matrices by rows.
 #[derive(Debug)]
 pub struct LoadedFunction<T> {
-    function: Function,
+    name: &'static str,
     inputs: Vec<Port>,
     outputs: Vec<Port>,
     counts: Counts,
@@ -74,19 +74,37 @@ impl std::error::Error for CallError {}
 
 impl<T: Number> LoadedFunction<T> {
     pub(crate) fn new(program: &TracedProgram, fused: bool, execution: ExecutionMode) -> LoadedFunction<T> {
-        let graph = &program.graph;
+        LoadedFunction::of(program.function.name(), (&program.graph, &program.schedule), fused, execution)
+    }
+
+    /// Of a graph that is none of the compiler's functions, as fast as this machine can execute it. Products and sums are rounded one by one.
+    ///
+    /// # Panics
+    /// If the graph is in mixed precision or has short sines.
+    pub fn of_graph(name: &'static str, graph: &Graph) -> LoadedFunction<T> {
+        assert!(graph.sines == Sines::Precise, "short sines are for microcontrollers");
+        let schedule = schedule(graph, ScheduleLimits::default(), None);
+        LoadedFunction::of(name, (graph, &schedule), false, ExecutionMode::best())
+    }
+
+    fn of(
+        name: &'static str,
+        (graph, schedule): (&Graph, &Schedule),
+        fused: bool,
+        execution: ExecutionMode,
+    ) -> LoadedFunction<T> {
         LoadedFunction {
-            function: program.function,
+            name,
             inputs: graph.inputs.clone(),
             outputs: graph.outputs.clone(),
             counts: graph.counts(),
-            executable: Executable::new(ProgramTape::new(graph, &program.schedule, fused), execution),
+            executable: T::executable((graph, schedule), fused, execution),
         }
     }
 
     /// Its name.
     pub fn name(&self) -> &'static str {
-        self.function.name()
+        self.name
     }
 
     /// What goes in, with shapes.
@@ -137,36 +155,136 @@ impl<T: Number> LoadedFunction<T> {
         inputs: &[(&[T], BatchLayout)],
         results: &mut [(&mut [T], BatchLayout)],
     ) -> Result<(), CallError> {
+        self.expect_arrays(states, inputs, results)?;
+        T::run_states(self, states, inputs, results);
+        Ok(())
+    }
+
+    /// The same by so many threads at most. Results have the same bits.
+    ///
+    /// # Errors
+    /// As [`batch`](Self::batch).
+    pub fn batch_in_threads(
+        &self,
+        threads: usize,
+        states: usize,
+        inputs: &[(&[T], BatchLayout)],
+        results: &mut [(&mut [T], BatchLayout)],
+    ) -> Result<(), CallError> {
+        self.expect_arrays(states, inputs, results)?;
+        let lanes = self.executable.lanes(true);
+        let each = states.div_ceil(threads.max(1)).next_multiple_of(lanes);
+        if threads <= 1 || each >= states {
+            T::run_states(self, states, inputs, results);
+            return Ok(());
+        }
+        let mut parts = self.parts(each, states, inputs, results);
+        std::thread::scope(|scope| {
+            for part in &mut parts {
+                scope.spawn(|| {
+                    let mut results: Vec<_> = part.results.iter_mut().map(ThreadResult::array).collect();
+                    T::run_states(self, part.states, &part.inputs, &mut results);
+                });
+            }
+        });
+        let own: Vec<_> = parts.into_iter().flat_map(StatesOfThread::own_results).collect();
+        for (first, k, own, entries) in own {
+            let (array, BatchLayout { by_state, by_entry }) = &mut results[k];
+            for (i, x) in own.into_iter().enumerate() {
+                array[(first + i / entries) * *by_state + i % entries * *by_entry] = x;
+            }
+        }
+        Ok(())
+    }
+
+    /// What threads do that take so many states each.
+    fn parts<'a>(
+        &self,
+        each: usize,
+        states: usize,
+        inputs: &[(&'a [T], BatchLayout)],
+        results: &'a mut [(&mut [T], BatchLayout)],
+    ) -> Vec<StatesOfThread<'a, T>> {
+        let mut parts: Vec<StatesOfThread<'a, T>> = Vec::new();
+        for first in (0..states).step_by(each) {
+            let from = |(array, layout): &(&'a [T], BatchLayout)| (first * layout.by_state).min(array.len());
+            let inputs = inputs.iter().map(|input| (&input.0[from(input)..], input.1)).collect();
+            parts.push(StatesOfThread { first, states: each.min(states - first), inputs, results: Vec::new() });
+        }
+        for ((array, layout), port) in results.iter_mut().zip(&self.outputs) {
+            let (layout, entries) = (*layout, port.len());
+            // states that lie one behind the other are written where they belong; others are copied there
+            let is_by_state = layout.length(1, entries).is_some_and(|length| length <= layout.by_state);
+            let mut rest: &mut [T] = array;
+            for part in &mut parts {
+                part.results.push(match is_by_state {
+                    true => {
+                        let (mine, others) = rest.split_at_mut((part.states * layout.by_state).min(rest.len()));
+                        rest = others;
+                        ThreadResult::InPlace(mine, layout)
+                    }
+                    false => ThreadResult::Own(vec![T::default(); part.states * entries], entries),
+                });
+            }
+        }
+        parts
+    }
+
+    fn expect_arrays(
+        &self,
+        states: usize,
+        inputs: &[(&[T], BatchLayout)],
+        results: &[(&mut [T], BatchLayout)],
+    ) -> Result<(), CallError> {
         expect_as_many("inputs", &self.inputs, inputs.len())?;
         expect_as_many("results", &self.outputs, results.len())?;
         for (port, (array, layout)) in self.inputs.iter().zip(inputs) {
             expect_length(port, *layout, states, array.len())?;
         }
-        for (port, (array, layout)) in self.outputs.iter().zip(&*results) {
+        for (port, (array, layout)) in self.outputs.iter().zip(results) {
             if !layout.is_apart(states, port.len()) {
                 return Err(CallError::Overlap { name: port.name.clone(), layout: *layout });
             }
             expect_length(port, *layout, states, array.len())?;
         }
-        let lanes = self.executable.lanes(true);
-        let mut frame = vec![T::default(); self.executable.frame_length(true)];
-        for first in (0..states).step_by(lanes) {
-            let mut at = 0;
-            for (port, (array, layout)) in self.inputs.iter().zip(inputs) {
-                let length = port.len() * lanes;
-                layout.gather(array, [first, states], lanes, &mut frame[at..at + length]);
-                at += length;
-            }
-            self.executable.run(&mut frame, true);
-            let mut k = 0;
-            for (port, (array, layout)) in self.outputs.iter().zip(&mut *results) {
-                for entry in 0..port.len() {
-                    layout.scatter(self.executable.result(&frame, k, true), [first, states], entry, array);
-                    k += 1;
-                }
-            }
-        }
         Ok(())
+    }
+}
+
+/// What a thread computes of a batch.
+struct StatesOfThread<'a, T> {
+    first: usize,
+    states: usize,
+    inputs: Vec<(&'a [T], BatchLayout)>,
+    results: Vec<ThreadResult<'a, T>>,
+}
+
+impl<T> StatesOfThread<'_, T> {
+    /// The results that are still to be copied: from which state on, which, and how many entries of a state.
+    fn own_results(self) -> impl Iterator<Item = (usize, usize, Vec<T>, usize)> {
+        let own = |(k, result)| match result {
+            ThreadResult::Own(own, entries) => Some((k, own, entries)),
+            ThreadResult::InPlace(..) => None,
+        };
+        let own: Vec<_> = self.results.into_iter().enumerate().filter_map(own).collect();
+        own.into_iter().map(move |(k, own, entries)| (self.first, k, own, entries))
+    }
+}
+
+/// Where a thread writes a result.
+enum ThreadResult<'a, T> {
+    /// Into its part of the array.
+    InPlace(&'a mut [T], BatchLayout),
+    /// Into memory of its own, so many entries of each state.
+    Own(Vec<T>, usize),
+}
+
+impl<T> ThreadResult<'_, T> {
+    fn array(&mut self) -> (&mut [T], BatchLayout) {
+        match self {
+            ThreadResult::InPlace(array, layout) => (array, *layout),
+            ThreadResult::Own(own, entries) => (own, BatchLayout::states_of(*entries)),
+        }
     }
 }
 
@@ -192,16 +310,95 @@ impl<T: Number> Runner<'_, T> {
                 return Err(CallError::Length { name: port.name.clone(), expected: port.len(), found });
             }
         }
-        let lanes = executable.lanes(false);
-        let scalars = inputs.iter().flat_map(|array| array.iter());
-        for (block, x) in self.frame.chunks_exact_mut(lanes).zip(scalars) {
-            block.fill(*x);
-        }
-        executable.run(&mut self.frame, false);
-        for (k, result) in results.iter_mut().flat_map(|array| array.iter_mut()).enumerate() {
-            *result = executable.result(&self.frame, k, false)[0];
-        }
+        T::run_state(executable, &mut self.frame, inputs, results);
         Ok(())
+    }
+}
+
+/// What is compiled with this crate, optimised as it is, and not once more with whoever uses it.
+pub trait CompiledHere: Sized {
+    /// A program that can be executed.
+    fn executable(program: (&Graph, &Schedule), fused: bool, execution: ExecutionMode) -> Executable<Self>;
+
+    /// One state, of arrays that are as long as they should be.
+    fn run_state(executable: &Executable<Self>, frame: &mut [Self], inputs: &[&[Self]], results: &mut [&mut [Self]]);
+
+    /// Many, likewise.
+    fn run_states(
+        function: &LoadedFunction<Self>,
+        states: usize,
+        inputs: &[(&[Self], BatchLayout)],
+        results: &mut [(&mut [Self], BatchLayout)],
+    );
+}
+
+/// By functions of these names that take any number.
+macro_rules! compiled_here {
+    ($($number:ty),*) => {$(
+        impl CompiledHere for $number {
+            fn executable((graph, schedule): (&Graph, &Schedule), fused: bool, execution: ExecutionMode) -> Executable<$number> {
+                Executable::new(ProgramTape::new(graph, schedule, fused), execution)
+            }
+
+            fn run_state(
+                executable: &Executable<$number>,
+                frame: &mut [$number],
+                inputs: &[&[$number]],
+                results: &mut [&mut [$number]],
+            ) {
+                run_state(executable, frame, inputs, results);
+            }
+
+            fn run_states(
+                function: &LoadedFunction<$number>,
+                states: usize,
+                inputs: &[(&[$number], BatchLayout)],
+                results: &mut [(&mut [$number], BatchLayout)],
+            ) {
+                run_states(function, states, inputs, results);
+            }
+        }
+    )*};
+}
+
+compiled_here!(f64, f32);
+
+fn run_state<T: Number>(executable: &Executable<T>, frame: &mut [T], inputs: &[&[T]], results: &mut [&mut [T]]) {
+    let lanes = executable.lanes(false);
+    let scalars = inputs.iter().flat_map(|array| array.iter());
+    for (block, x) in frame.chunks_exact_mut(lanes).zip(scalars) {
+        block.fill(*x);
+    }
+    executable.run(frame, false);
+    for (k, result) in results.iter_mut().flat_map(|array| array.iter_mut()).enumerate() {
+        *result = executable.result(frame, k, false)[0];
+    }
+}
+
+fn run_states<T: Number>(
+    function: &LoadedFunction<T>,
+    states: usize,
+    inputs: &[(&[T], BatchLayout)],
+    results: &mut [(&mut [T], BatchLayout)],
+) {
+    let LoadedFunction { inputs: taken, outputs, executable, .. } = function;
+    let lanes = executable.lanes(true);
+    let mut frame = vec![T::default(); executable.frame_length(true)];
+    for first in (0..states).step_by(lanes) {
+        let mut at = 0;
+        for (port, (array, layout)) in taken.iter().zip(inputs) {
+            let length = port.len() * lanes;
+            layout.gather(array, [first, states], lanes, &mut frame[at..at + length]);
+            at += length;
+        }
+        executable.run(&mut frame, true);
+        let mut k = 0;
+        for (port, (array, layout)) in outputs.iter().zip(&mut *results) {
+            for entry in 0..port.len() {
+                layout.scatter(executable.result(&frame, k, true), [first, states], entry, array);
+                k += 1;
+            }
+        }
     }
 }
 

@@ -1,10 +1,11 @@
 //! The numbers that programs are executed in.
 
+use crate::function::CompiledHere;
 use straightline_core::{trig, Real};
 use straightline_graph::Scalar;
 
 /// A floating-point number that the machine has vectors of.
-pub trait Number: Real + Default + Send + Sync + 'static {
+pub trait Number: Real + Default + Send + Sync + CompiledHere + 'static {
     /// Its name among those of the compiler.
     const SCALAR: Scalar;
     /// Its length in bytes, which is that of its units in memory.

@@ -7,6 +7,8 @@
 use crate::drives::{slack_state, smooth_losses, DriveEnergies};
 use crate::simulate::Method;
 use std::borrow::Cow;
+use std::fmt;
+use std::sync::Arc;
 use straightline_core::algorithms::{
     bias_force, drive_energy, drive_states, driven_motion, forward_dynamics_aba, kinetic_energy, mass_matrix,
     potential_energy, DrivenMotion, Links,
@@ -22,6 +24,33 @@ pub struct Plant {
     pub model: Model<f64>,
     /// Of every drive whether its input is a current.
     currents: Vec<bool>,
+    /// What computes its motion; none: the generic runtime.
+    equations: Option<Arc<dyn MotionEquations>>,
+}
+
+/// The equations of motion of a robot.
+pub trait MotionEquations: fmt::Debug + Send + Sync {
+    /// q̈ under generalized forces τ \[N·m or N\].
+    fn forward_dynamics(&self, q: &[f64], qd: &[f64], tau: &[f64]) -> Vec<f64>;
+    /// The generalized forces of gravity, of Coriolis and centrifugal forces, and of what the joints have of their own \[N·m or N\].
+    fn bias_force(&self, q: &[f64], qd: &[f64]) -> Vec<f64>;
+    /// H, row by row.
+    fn mass_matrix(&self, q: &[f64]) -> Vec<f64>;
+}
+
+/// By the generic runtime.
+impl MotionEquations for Model<f64> {
+    fn forward_dynamics(&self, q: &[f64], qd: &[f64], tau: &[f64]) -> Vec<f64> {
+        forward_dynamics_aba(self, q, qd, tau)
+    }
+
+    fn bias_force(&self, q: &[f64], qd: &[f64]) -> Vec<f64> {
+        bias_force(self, q, qd)
+    }
+
+    fn mass_matrix(&self, q: &[f64]) -> Vec<f64> {
+        mass_matrix(self, q)
+    }
 }
 
 /// What acts on a robot.
@@ -49,7 +78,7 @@ impl Plant {
             smooth_losses(drive, coulomb_speed);
         }
         let currents = vec![false; model.drives.len()];
-        Plant { model, currents }
+        Plant { model, currents, equations: None }
     }
 
     /// The same with amplifiers that keep up a current, as far as the voltage allows: the inputs of these drives are in A, and their
@@ -63,6 +92,20 @@ impl Plant {
             }
         }
         self
+    }
+
+    /// The same, whose motion these compute. They are of the [`model`](Plant::model).
+    #[must_use]
+    pub fn moved_by(self, equations: Arc<dyn MotionEquations>) -> Plant {
+        Plant { equations: Some(equations), ..self }
+    }
+
+    /// What computes its motion.
+    pub(crate) fn equations(&self) -> &dyn MotionEquations {
+        match &self.equations {
+            Some(equations) => equations.as_ref(),
+            None => &self.model,
+        }
     }
 
     /// The same with limits of currents that implicit steps find a solution at: an inductive current is slowed down over the last
@@ -190,8 +233,9 @@ impl Plant {
         let (q, qd, ..) = self.split(state);
         let (q, x) = (configuration(&self.model, q), self.x(state));
         let u = self.inputs(qd, x, &action.u);
-        let bias: Vec<f64> = bias_force(&self.model, &q, qd).iter().zip(&action.tau).map(|(h, tau)| h - tau).collect();
-        let h = mass_matrix(&self.model, &q);
+        let bias = self.equations().bias_force(&q, qd);
+        let bias: Vec<f64> = bias.iter().zip(&action.tau).map(|(h, tau)| h - tau).collect();
+        let h = self.equations().mass_matrix(&q);
         driven_motion(&self.model, (&q, qd, x, &u), &bias, &Links::MassMatrix(&h))
     }
 
@@ -238,7 +282,7 @@ impl Plant {
                 rate[after + 2..].iter_mut().zip(flow.powers()).for_each(|(sum, power)| *sum += power);
             }
         } else {
-            rate[nq..nq + nv].copy_from_slice(&forward_dynamics_aba(&self.model, &q, qd, &action.tau));
+            rate[nq..nq + nv].copy_from_slice(&self.equations().forward_dynamics(&q, qd, &action.tau));
         }
         rate[after] = action.tau.iter().zip(qd).map(|(tau, qd)| tau * qd).sum();
         rate[after + 1] = self.losses(&q, qd);

@@ -9,6 +9,7 @@ use crate::{contact, gains, options, page, print, CommandFailure};
 use anstream::stdout;
 use std::io::Write;
 use std::path::Path;
+use straightline_cli::experiment::equations::by_machine_code;
 use straightline_cli::experiment::{self, parquet, Experiment};
 use straightline_codegen::description::{self, Description};
 use straightline_codegen::diagnostic::{Diagnostic, Diagnostics, Severity};
@@ -162,7 +163,7 @@ pub fn simulate(a: &Simulate) -> Result<(), CommandFailure> {
     }
     let contacts = contact::read(&a.input, &model, &options.scene.contacts)?;
     let currents = experiment.command.current_inputs(model.drives.len());
-    let plant = Plant::new(model, experiment.coulomb_speed).with_current_inputs(&currents);
+    let plant = by_machine_code(Plant::new(model, experiment.coulomb_speed).with_current_inputs(&currents));
     let bar = print::bar("simulating", 1000);
     let duration = experiment.settings.duration;
     let how_far = print::Progress::new();

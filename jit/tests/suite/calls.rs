@@ -99,3 +99,32 @@ fn batches_have_the_bits_of_single_calls_in_every_layout() {
         }
     }
 }
+
+/// Of as many threads as there are, more than there are, and more than there are states.
+#[test]
+fn threads_have_the_bits_of_one() {
+    let robot = planar(ExecutionMode::best());
+    let function = robot.function("mass_matrix").expect("it was asked for");
+    for (states, threads) in [(0, 2), (1, 2), (3, 2), (64, 2), (65, 3), (1000, 2), (1001, 7), (33, 100), (50, 0)] {
+        let layouts = |entries: usize| {
+            let apart = BatchLayout { by_state: entries * 3 + 1, by_entry: 2 };
+            [BatchLayout::states_of(entries), BatchLayout::entries_of(states), apart]
+        };
+        let q: Vec<f64> = (0..states * 7 + 7).map(|k| (k as f64 * 0.37).sin() * 3.0).collect();
+        for (from, to) in layouts(2).into_iter().flat_map(|from| layouts(4).map(|to| (from, to))) {
+            let mut h = [vec![f64::NAN; states * 13 + 7], vec![f64::NAN; states * 13 + 7]];
+            function.batch(states, &[(&q, from)], &mut [(&mut h[0], to)]).unwrap_or_else(|e| panic!("{e}"));
+            let found = function.batch_in_threads(threads, states, &[(&q, from)], &mut [(&mut h[1], to)]);
+            found.unwrap_or_else(|e| panic!("{e}"));
+            let [one, several] = h.map(|h| h.into_iter().map(f64::to_bits).collect::<Vec<u64>>());
+            assert_eq!(one, several, "{states} states, {threads} threads, {from:?}, {to:?}");
+        }
+    }
+    let short = function.batch_in_threads(
+        2,
+        10,
+        &[(&[0.0; 19], BatchLayout::states_of(2))],
+        &mut [(&mut [0.0; 40], BatchLayout::states_of(4))],
+    );
+    assert_eq!(short, Err(CallError::Length { name: "q".to_string(), expected: 20, found: 19 }));
+}

@@ -4,9 +4,7 @@ use super::object::{let_go, SLOTS};
 use super::state::{Closed, ContactWorld, Phases, Rows, Seen, Slip, StateParts, GUARDS, RIDGE, SLACK};
 use super::{ContactEvent, Event};
 use crate::plant::Action;
-use straightline_core::algorithms::{
-    driven_jump, impact, mass_matrix, projection, FunctionalCoordinates, Struck, Support,
-};
+use straightline_core::algorithms::{driven_jump, impact, projection, FunctionalCoordinates, Struck, Support};
 use straightline_core::contact::Coordinate;
 
 /// Slower than this \[m/s\] an open contact that stands on its object is at rest there.
@@ -71,7 +69,7 @@ impl ContactWorld<'_> {
         if self.plant.is_driven() {
             let (model, q) = (&self.plant.model, &state[..self.nq()]);
             let inertial = |row: &[f64]| row.iter().zip(dqd).map(|(h, x)| h * x).sum::<f64>();
-            let mut held: Vec<f64> = mass_matrix(model, q).chunks(dqd.len()).map(inertial).collect();
+            let mut held: Vec<f64> = self.plant.equations().mass_matrix(q).chunks(dqd.len()).map(inertial).collect();
             for (row, impulse) in directions.iter().zip(impulses) {
                 held.iter_mut().zip(row).for_each(|(sum, j)| *sum -= j * impulse);
             }

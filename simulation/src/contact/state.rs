@@ -9,9 +9,8 @@ use super::{Contacts, Touch};
 use crate::plant::{Action, Plant};
 use std::ops::Range;
 use straightline_core::algorithms::{
-    applied_rows, bias_force, constrained_forward_dynamics, driven_contact_motion, driven_factor,
-    functional_coordinates, mass_matrix, relative_motion, ContactRows, DrivenMotion, FunctionalCoordinates, Ltdl,
-    RelativeMotion, Support,
+    applied_rows, constrained_forward_dynamics, driven_contact_motion, driven_factor, functional_coordinates,
+    relative_motion, ContactRows, DrivenMotion, FunctionalCoordinates, Ltdl, RelativeMotion, Support,
 };
 use straightline_core::contact::{Contact, Coordinate, Object};
 use straightline_core::spatial::Vec3;
@@ -273,7 +272,7 @@ impl<'a> ContactWorld<'a> {
 
     /// The factor of H, rotors of rigid drives in it.
     pub fn factor(&self, q: &[f64]) -> Ltdl<f64> {
-        let (model, h) = (&self.plant.model, mass_matrix(&self.plant.model, q));
+        let (model, h) = (&self.plant.model, self.plant.equations().mass_matrix(q));
         match self.plant.is_driven() {
             true => driven_factor(model, q, &h),
             false => Ltdl::factor(model, &h),
@@ -283,14 +282,15 @@ impl<'a> ContactWorld<'a> {
     /// q̈ and F under what acts.
     pub fn moved(&self, state: &[f64], rows: Rows, action: &Action) -> Moved {
         let (model, StateParts { q, qd, .. }) = (&self.plant.model, self.parts(state));
-        let bias = bias_force(model, q, qd);
+        let bias = self.plant.equations().bias_force(q, qd);
         let applied = Some(rows.applied.as_slice());
         if self.plant.is_driven() {
             let x = self.plant.x(state);
             let u = self.plant.inputs(qd, x, &action.u);
             let bias: Vec<f64> = bias.iter().zip(&action.tau).map(|(h, tau)| h - tau).collect();
             let of = ContactRows { coordinates: &rows.s, applied, supports: &rows.supports, ridge: RIDGE };
-            let (found, drives) = driven_contact_motion(model, (q, qd, x, &u), &bias, &mass_matrix(model, q), of);
+            let h = self.plant.equations().mass_matrix(q);
+            let (found, drives) = driven_contact_motion(model, (q, qd, x, &u), &bias, &h, of);
             return Moved { qdd: found.qdd, force: found.force, rows, drives: Some(drives) };
         }
         let drive: Vec<f64> = action.tau.iter().zip(bias).map(|(tau, h)| tau - h).collect();

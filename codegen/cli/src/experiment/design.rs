@@ -10,19 +10,20 @@ use straightline_codegen::diagnostic::Diagnostic;
 use straightline_core::algorithms::{inverse_dynamics, joint_wrenches};
 use straightline_core::model::{Coulomb, JointEffects, Load, Model};
 use straightline_core::{Dd, Real};
-use straightline_graph::expr::{evaluate, gradient, Graph, Port, RuleSet};
+use straightline_graph::expr::{gradient, Port, RuleSet};
 use straightline_graph::pass::dead_code;
 use straightline_graph::trace::{trace, Expr};
+use straightline_jit::LoadedFunction;
 
-/// The programs of a robot with some of its numbers as inputs.
-#[derive(Clone, Debug)]
+/// The programs of a robot with some of its numbers as inputs, as machine code.
+#[derive(Debug)]
 pub struct Design {
     /// q, q̇, q̈, p to tau.
-    torques: Graph,
+    torques: LoadedFunction<f64>,
     /// q, q̇, q̈, p to the wrenches of the joints, forces before moments.
-    wrenches: Graph,
+    wrenches: LoadedFunction<f64>,
     /// q, q̇, q̈, p and a λ per joint to λᵀ ∂tau/∂p.
-    gradient: Graph,
+    gradient: LoadedFunction<f64>,
 }
 
 /// What of the robot follows a parameter.
@@ -68,24 +69,35 @@ impl Design {
             found.iter().flat_map(|w| [w.force.to_array(), w.moment.to_array()].concat()).collect()
         });
         let gradient = dead_code(&gradient(&torques, "p"));
-        Ok(Design { torques: dead_code(&torques), wrenches: dead_code(&wrenches), gradient })
+        Ok(Design {
+            torques: LoadedFunction::of_graph("torques", &dead_code(&torques)),
+            wrenches: LoadedFunction::of_graph("wrenches", &dead_code(&wrenches)),
+            gradient: LoadedFunction::of_graph("gradient", &gradient),
+        })
     }
 
     /// Joint torques or forces tau \[N·m or N\] of a motion for these values of the parameters.
     pub fn torques(&self, q: &[f64], qd: &[f64], qdd: &[f64], p: &[f64]) -> Vec<f64> {
-        evaluate(&self.torques, &[q, qd, qdd, p].concat())
+        results(&self.torques, &[q, qd, qdd, p])
     }
 
     /// What every joint exerts on its link, force \[N\] and moment \[N·m\], in the order of the velocity coordinates.
     pub fn wrenches(&self, q: &[f64], qd: &[f64], qdd: &[f64], p: &[f64]) -> Vec<[f64; 6]> {
-        let flat = evaluate(&self.wrenches, &[q, qd, qdd, p].concat());
+        let flat = results(&self.wrenches, &[q, qd, qdd, p]);
         flat.chunks(6).map(|w| std::array::from_fn(|k| w[k])).collect()
     }
 
     /// λᵀ ∂tau/∂p.
     pub fn gradient(&self, q: &[f64], qd: &[f64], qdd: &[f64], p: &[f64], seed: &[f64]) -> Vec<f64> {
-        evaluate(&self.gradient, &[q, qd, qdd, p, seed].concat())
+        results(&self.gradient, &[q, qd, qdd, p, seed])
     }
+}
+
+/// The only result of a function.
+fn results(function: &LoadedFunction<f64>, inputs: &[&[f64]]) -> Vec<f64> {
+    let mut found = vec![0.0; function.outputs()[0].len()];
+    function.call(inputs, &mut [&mut found]).expect("arrays are as long as the robot has joints and parameters");
+    found
 }
 
 fn change(

@@ -4,6 +4,7 @@
 
 pub mod contact;
 pub mod design;
+pub mod equations;
 mod gains;
 pub mod messages;
 pub mod parameter;

@@ -10,6 +10,8 @@ mod export;
 #[cfg(feature = "parquet")]
 mod fuzz;
 mod in_c;
+#[cfg(feature = "parquet")]
+mod machine_code;
 #[path = "../../../../generated_tests/src/made.rs"]
 mod made;
 mod optimal_control;
