@@ -40,6 +40,7 @@ pub mod machine;
 mod native;
 mod number;
 mod robot;
+mod store;
 pub mod tape;
 
 pub use batch::BatchLayout;
@@ -47,3 +48,9 @@ pub use engine::ExecutionMode;
 pub use function::{CallError, LoadedFunction, Runner};
 pub use number::Number;
 pub use robot::{LoadError, LoadedRobot as Robot, UnknownFunction};
+pub use store::ProgramFolder;
+
+// The code of the guide: compiled and run by `cargo test -p straightline-jit --doc`.
+#[cfg(doctest)]
+#[doc = include_str!("../../guide/src/run-time.md")]
+struct GuideRunTime;

@@ -4,9 +4,11 @@ use crate::engine::ExecutionMode;
 use crate::function::LoadedFunction;
 use crate::number::Number;
 use std::fmt;
-use straightline_codegen::compile::{compile_programs, CheckedPrograms};
+use straightline_codegen::choices::OptimisationTier;
+use straightline_codegen::compile::{compile_programs_by, CheckedPrograms};
 use straightline_codegen::diagnostic::{Diagnostics, Source};
 use straightline_codegen::options::Options;
+use straightline_codegen::program::stored::{NoStore, ProgramStore};
 use straightline_core::model::Model;
 use straightline_core::Dd;
 use straightline_graph::expr::Sines;
@@ -82,8 +84,26 @@ impl<T: Number> LoadedRobot<T> {
         options: &Options,
         execution: ExecutionMode,
     ) -> Result<LoadedRobot<T>, LoadError> {
+        Self::load_by(source, options, execution, &NoStore)
+    }
+
+    /// The same, where programs that a store has are not made again, such as a [`ProgramFolder`](crate::ProgramFolder). Those that are quickly made
+    /// (`optimise`) are neither looked up nor kept.
+    ///
+    /// # Errors
+    /// As [`load`](Self::load).
+    pub fn load_by(
+        source: &Source,
+        options: &Options,
+        execution: ExecutionMode,
+        store: &dyn ProgramStore,
+    ) -> Result<LoadedRobot<T>, LoadError> {
         let options = Options { scalar: T::SCALAR, also: Vec::new(), ..options.clone() };
-        let programs = compile_programs(source, &options).map_err(LoadError::Wrong)?;
+        let store = match options.optimise {
+            OptimisationTier::Full => store,
+            OptimisationTier::Quick => &NoStore,
+        };
+        let programs = compile_programs_by(source, &options, store).map_err(LoadError::Wrong)?;
         LoadedRobot::from_programs(programs, options.fma, execution)
     }
 

@@ -36,6 +36,7 @@ macro_rules! numbers {
     })+) => {
         /// The scalar type of generated code.
         #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+        #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
         pub enum Scalar {
             $($(#[$doc])* $Name,)+
         }

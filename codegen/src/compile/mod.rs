@@ -20,6 +20,7 @@ use crate::program::equivalence::Disagreement;
 use crate::program::fixed::fixed_functions;
 use crate::program::mixed::mix_precisions;
 use crate::program::staged::figures;
+use crate::program::stored::{NoStore, ProgramStore};
 use crate::program::written::WrittenFunction;
 use crate::program::{range, TracedProgram};
 use crate::readback::c99::CReader;
@@ -29,6 +30,7 @@ use crate::report::waterfall;
 use crate::{readback, scene};
 use figures::{with_figures, Compilation};
 use prepare::{prepare, Prepared};
+use programs::Stored;
 use straightline_core::model::Model;
 use straightline_core::Dd;
 use straightline_graph::Scalar;
@@ -100,13 +102,16 @@ struct Compiling {
     hash: u64,
 }
 
-fn compiling(source: &Source, options: &Options) -> Result<Compiling, Diagnostics> {
+fn compiling(source: &Source, options: &Options, store: &dyn ProgramStore) -> Result<Compiling, Diagnostics> {
     let Prepared { description, whole, model, frames, options, resolved, mut diagnostics } = prepare(source, options)?;
-    let hash = hash(source.text(), &diagnostics, &resolved);
     let robot = Robot::new(model).knowing_base_parameters(&resolved.functions, &resolved.scene);
     let is_empty = |f: &Function| f.is_per_frame() && resolved.scene.frames_of(*f, &frames).is_empty();
     let functions: Vec<Function> = resolved.functions.iter().copied().filter(|f| !is_empty(f)).collect();
-    let programs = programs::programs(&robot, &frames, &functions, &resolved);
+    let hash_of = |options: &Options| hash(source.text(), &diagnostics, options);
+    let key = |function| hash_of(&Options { functions: vec![function], ..resolved.clone() });
+    let hash = hash_of(&resolved);
+    let stored = Stored { store, key: &key };
+    let programs = programs::programs(&robot, &frames, &functions, &resolved, &stored);
     let mut programs = programs.map_err(|wrong| only(no_form(&wrong, &robot.model, options.scalar, &description)))?;
     for program in &mut programs {
         if let Err(wrong) = mix_precisions(&robot, &frames, program, &resolved) {
@@ -146,7 +151,19 @@ pub struct CheckedPrograms {
 /// # Errors
 /// As [`compile`], but for budgets.
 pub fn compile_programs(source: &Source, options: &Options) -> Result<CheckedPrograms, Diagnostics> {
-    let Compiling { robot, frames, programs, mut diagnostics, .. } = compiling(source, options)?;
+    compile_programs_by(source, options, &NoStore)
+}
+
+/// The same, where programs that a store has are not made again. They are checked again.
+///
+/// # Errors
+/// As [`compile_programs`].
+pub fn compile_programs_by(
+    source: &Source,
+    options: &Options,
+    store: &dyn ProgramStore,
+) -> Result<CheckedPrograms, Diagnostics> {
+    let Compiling { robot, frames, programs, mut diagnostics, .. } = compiling(source, options, store)?;
     diagnostics.sort();
     match diagnostics.has_errors() {
         true => Err(diagnostics),
@@ -155,7 +172,7 @@ pub fn compile_programs(source: &Source, options: &Options) -> Result<CheckedPro
 }
 
 fn compile_in_one_scalar(source: &Source, options: &Options, explained: bool) -> Result<Generated, Diagnostics> {
-    let compiling = compiling(source, options)?;
+    let compiling = compiling(source, options, &NoStore)?;
     let Compiling { whole, robot, frames, options, resolved, mut programs, mut diagnostics, hash } = compiling;
     let measures: Vec<(Function, Measures)> =
         programs.iter().map(|p| (p.function, Measures::of(p, options.scalar))).collect();

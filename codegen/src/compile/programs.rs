@@ -5,12 +5,19 @@ use crate::equations::Robot;
 use crate::function::Function;
 use crate::options::Options;
 use crate::program::equivalence::Disagreement;
+use crate::program::stored::{accepted, ProgramStore};
 use crate::program::{checked, TracedProgram};
 use std::panic::resume_unwind;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
 /// Of a thread: what recurses over a program of some ten thousand operations has to have room.
 const STACK: usize = 16 << 20;
+
+/// What programs are looked up in, and the key of a function's program.
+pub(super) struct Stored<'a> {
+    pub store: &'a dyn ProgramStore,
+    pub key: &'a (dyn Fn(Function) -> u64 + Sync),
+}
 
 /// One per function, in their order.
 ///
@@ -21,14 +28,28 @@ pub(super) fn programs(
     frames: &[String],
     functions: &[Function],
     options: &Options,
+    stored: &Stored<'_>,
 ) -> Result<Vec<TracedProgram>, Disagreement> {
+    let made_or_found = |function: Function| {
+        let key = (stored.key)(function);
+        let found = stored.store.find(key).and_then(|graph| accepted(robot, frames, function, options, graph));
+        if let Some(found) = found {
+            return Ok(found);
+        }
+        let made = checked(robot, frames, function, options)?;
+        // what is plainer than it should be is said each time
+        if made.plainer.is_none() {
+            stored.store.keep(key, &made.graph);
+        }
+        Ok(made)
+    };
     let next = AtomicUsize::new(0);
     let work = || {
         let mut made = Vec::new();
         loop {
             let at = next.fetch_add(1, Ordering::Relaxed);
             let Some(function) = functions.get(at) else { return made };
-            made.push((at, checked(robot, frames, *function, options)));
+            made.push((at, made_or_found(*function)));
         }
     };
     let mut made = std::thread::scope(|scope| {

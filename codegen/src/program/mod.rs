@@ -19,6 +19,7 @@ pub mod range;
 pub mod self_test;
 mod sines;
 pub mod staged;
+pub mod stored;
 pub mod written;
 
 use crate::choices::WrittenEntries;

@@ -7,3 +7,4 @@ mod emulated;
 mod emulator;
 mod encoding;
 mod encoding_aarch64;
+mod store;

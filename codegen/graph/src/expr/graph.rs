@@ -7,6 +7,7 @@ use straightline_core::Dd;
 
 /// Index of a node in its [`Graph`]; operands have smaller indices than their users.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct NodeId(pub u32);
 
 impl NodeId {
@@ -18,6 +19,7 @@ impl NodeId {
 
 /// A constant in double-double, comparable by its bits.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Constant {
     hi: u64,
     lo: u64,
@@ -48,6 +50,7 @@ impl Constant {
 
 /// A node of a program: a leaf, an operation of the [tables](super::op), or part of an angle.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub enum Op {
     /// The input of that flat index (groups one after the other).
     Input(u32),
@@ -156,6 +159,7 @@ impl Op {
 
 /// A named group of inputs or outputs with its array shape, such as `q` with `[7]` or `h` with `[7, 7]`.
 #[derive(Clone, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Port {
     /// The name.
     pub name: String,
@@ -208,6 +212,7 @@ pub struct Note {
 /// The formats of a value of a program in mixed precision: one that differs from that in which it is computed is what it is rounded to, for all
 /// that use it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Precision {
     /// In which it is computed.
     pub computed: Scalar,
@@ -229,6 +234,7 @@ impl Precision {
 
 /// Operations that are the same for several lanes: a loop over them can write each row once.
 #[derive(Clone, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Alike {
     /// What the lanes are.
     pub lanes: LoopLanes,
@@ -241,6 +247,7 @@ pub struct Alike {
 
 /// What the lanes of a loop are.
 #[derive(Clone, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub enum LoopLanes {
     /// Identical limbs: the first part of each, as sections count them.
     Limbs(Vec<usize>),
@@ -260,12 +267,15 @@ impl LoopLanes {
 
 /// A program of scalar operations.
 #[derive(Clone, Debug, Default, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Graph {
     /// The operations.
     pub ops: Vec<Op>,
-    /// One note per operation.
+    /// One note per operation. They are not stored.
+    #[cfg_attr(feature = "serde", serde(skip))]
     pub notes: Vec<Note>,
-    /// Stretches that the notes refer to.
+    /// Stretches that the notes refer to. They are not stored.
+    #[cfg_attr(feature = "serde", serde(skip))]
     pub sections: Vec<Section>,
     /// Input groups; [`Op::Input`] counts through them.
     pub inputs: Vec<Port>,
@@ -284,6 +294,7 @@ pub struct Graph {
 
 /// A kernel of sines and cosines.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub enum Sines {
     /// Every digit, in the whole domain: `straightline_core::trig`.
     #[default]
@@ -340,6 +351,13 @@ pub const DIVISION: usize = 10;
 pub const TAIL: usize = 6;
 
 impl Graph {
+    /// The same with nothing said of its operations.
+    #[must_use]
+    pub fn without_notes(self) -> Self {
+        let notes = vec![Note { name: None, section: 0 }; self.ops.len()];
+        Graph { notes, sections: vec![Section { phase: "", index: None }], ..self }
+    }
+
     /// The terms of an angle: of a sum of angles those, of anything else itself.
     pub fn angle_terms(&self, angle: NodeId) -> Vec<NodeId> {
         match self.op(angle) {

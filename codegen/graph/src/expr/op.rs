@@ -131,6 +131,7 @@ macro_rules! operations {
      })+) => {
         $(#[$about])*
         #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
+        #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
         pub enum $Table {
             $($(#[$doc])* $Name,)+
         }
