@@ -9,11 +9,14 @@ use std::collections::BTreeMap;
 use std::hint::black_box;
 use std::path::PathBuf;
 use std::time::Instant;
+use straightline_codegen::choices::OptimisationTier;
 use straightline_codegen::model::states::random_inputs;
+use straightline_codegen::program::stored::{NoStore, ProgramStore};
 use straightline_codegen::verify::Verification;
+use straightline_codegen::{Options, Source};
 use straightline_core::Dd;
 use straightline_graph::in_scalar;
-use straightline_jit::{BatchLayout, LoadError, LoadedFunction, Number, Robot};
+use straightline_jit::{BatchLayout, ExecutionMode, LoadError, LoadedFunction, Number, ProgramFolder, Robot};
 
 /// States of a batch.
 const STATES: usize = 4096;
@@ -62,6 +65,10 @@ pub struct BenchReport {
     scalar: &'static str,
     /// How the functions were executed.
     execution: String,
+    /// From the text of the file to functions that can be called \[ms\].
+    milliseconds_to_load: f64,
+    /// The same, where programs were kept that are checked only \[ms\]; none of those that are made as quickly.
+    milliseconds_to_load_kept: Option<f64>,
     /// The greatest error that passes.
     bound: f64,
     functions: BTreeMap<&'static str, FunctionTimes>,
@@ -87,19 +94,44 @@ pub fn bench(a: &Bench) -> Result<(), CommandFailure> {
     let excess = verification.excess();
     let (source, (_, options)) = (files::read(&a.robot)?, compiled);
     let report = in_scalar!(options.scalar, T => {
-        let robot = Robot::<T>::load(&source, &options).map_err(|wrong| match wrong {
-            LoadError::Wrong(diagnostics) => print::refused(&diagnostics),
-            LoadError::Option { name, remedy } => {
-                print::failure_with(format!("`{name}` is for generated text, not for what is executed at once"), &[remedy])
-            }
-        })?;
-        measured(&robot, verification)
+        let (robot, times) = loaded::<T>(&source, &options)?;
+        measured(&robot, verification, times)
     });
     if a.json { print::json(&report) } else { print_report(&report) }?;
     excess.map_or(Ok(()), |why| Err(print::failure(why)))
 }
 
-fn measured<T: Number>(robot: &Robot<T>, verification: Verification) -> BenchReport {
+/// The robot, and how long it took \[ms\]: made, and kept in a folder.
+fn loaded<T: Number>(source: &Source, options: &Options) -> Result<(Robot<T>, (f64, Option<f64>)), CommandFailure> {
+    let load = |store: &dyn ProgramStore| {
+        let start = Instant::now();
+        let robot =
+            Robot::<T>::load_by(source, options, ExecutionMode::best(), store).map_err(|wrong| match wrong {
+                LoadError::Wrong(diagnostics) => print::refused(&diagnostics),
+                LoadError::Option { name, remedy } => print::failure_with(
+                    format!("`{name}` is for generated text, not for what is executed at once"),
+                    &[remedy],
+                ),
+            })?;
+        Ok::<_, CommandFailure>((robot, start.elapsed().as_secs_f64() * 1e3))
+    };
+    let (robot, made) = load(&NoStore)?;
+    let kept = match (options.optimise, tempfile::tempdir()) {
+        (OptimisationTier::Full, Ok(folder)) => {
+            let folder = ProgramFolder::new(folder.path());
+            load(&folder)?;
+            Some(load(&folder)?.1)
+        }
+        _ => None,
+    };
+    Ok((robot, (made, kept)))
+}
+
+fn measured<T: Number>(
+    robot: &Robot<T>,
+    verification: Verification,
+    (milliseconds_to_load, milliseconds_to_load_kept): (f64, Option<f64>),
+) -> BenchReport {
     let Verification { robot: name, scalar, bound, functions: errors, .. } = verification;
     let execution = robot.functions().first().map_or_else(String::new, |f| f.execution().to_string());
     let functions = robot.functions().iter().map(|function| {
@@ -115,7 +147,15 @@ fn measured<T: Number>(robot: &Robot<T>, verification: Verification) -> BenchRep
         };
         (function.name(), times)
     });
-    BenchReport { robot: name, scalar, execution, bound, functions: functions.collect() }
+    BenchReport {
+        robot: name,
+        scalar,
+        execution,
+        milliseconds_to_load,
+        milliseconds_to_load_kept,
+        bound,
+        functions: functions.collect(),
+    }
 }
 
 /// Nanoseconds of a call and of a state in a batch.
@@ -165,7 +205,7 @@ fn nanoseconds(mut run: impl FnMut()) -> f64 {
 }
 
 fn print_report(report: &BenchReport) -> std::io::Result<()> {
-    let BenchReport { robot, scalar, execution, bound, functions } = report;
+    let BenchReport { robot, scalar, execution, bound, functions, .. } = report;
     let mut table = FunctionTable::new(&format!("{robot}: {scalar}, {execution}"), functions.keys())?;
     table.row("function", &["operations", "sincos", "ns/call", "ns/state", "bytes", "error"])?;
     for (name, f) in functions {
@@ -177,7 +217,10 @@ fn print_report(report: &BenchReport) -> std::io::Result<()> {
             &[f.operations.to_string(), f.sincos.to_string(), call, state, f.code_bytes.to_string(), error],
         )?;
     }
+    let kept = report.milliseconds_to_load_kept.map(|kept| format!(", {kept:.1} ms where programs were kept"));
+    let (made, kept) = (report.milliseconds_to_load, kept.unwrap_or_default());
     table.foot(&format!(
-        "ns/state: in a batch of {STATES} states, one thread; error: beside the second author, divided by natural scale, bound {bound:.1e}"
+        "from the file's text to machine code: {made:.1} ms{kept}\n\
+         ns/state: in a batch of {STATES} states, one thread; error: beside the second author, divided by natural scale, bound {bound:.1e}"
     ))
 }

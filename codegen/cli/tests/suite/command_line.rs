@@ -224,6 +224,9 @@ fn bench_measures_every_function_without_a_compiler() {
         let run = straightline(&[&["bench", ARM, "--states", "3", "--json"], more].concat());
         assert_eq!(run.code, 0, "{}", run.err);
         let report: serde_json::Value = serde_json::from_str(&run.out).unwrap();
+        for time in ["milliseconds_to_load", "milliseconds_to_load_kept"] {
+            assert!(report[time].as_f64().unwrap() > 0.0, "{}", run.out);
+        }
         let functions = report["functions"].as_object().unwrap();
         assert_eq!(functions.len(), 15);
         for (name, f) in functions {
@@ -237,6 +240,11 @@ fn bench_measures_every_function_without_a_compiler() {
     assert_eq!(run.code, 0, "{}", run.err);
     let row = run.out.lines().find(|line| line.starts_with("mass_matrix")).expect("a line of the function");
     assert_eq!(row.split_whitespace().count(), 7, "{}", run.out);
+    // what is made as quickly is not kept
+    let quick =
+        straightline(&["bench", ARM, "--states", "3", "--function", "mass_matrix", "--optimise", "quick", "--json"]);
+    let report: serde_json::Value = serde_json::from_str(&quick.out).unwrap();
+    assert!(report["milliseconds_to_load_kept"].is_null(), "{}", quick.out);
     assert_eq!(straightline(&["bench", "nowhere.urdf"]).code, 3);
 }
 
