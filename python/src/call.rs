@@ -1,0 +1,139 @@
+//! A call of a function, for one state or many.
+
+use crate::arguments::CallArguments;
+use crate::arrays::{as_it_is, common_states, result_of, ArrayNumber, BorrowedInput, InputArray, OutputArray};
+use numpy::PyReadonlyArray1;
+use pyo3::exceptions::PyRuntimeError;
+use pyo3::prelude::*;
+use std::thread;
+use straightline_graph::expr::Counts;
+use straightline_jit::{BatchLayout, CallError, LoadedFunction};
+
+/// Operations from which on other threads of Python run meanwhile: it takes as long to let them.
+const LONG: usize = 20_000;
+/// As many operations a pair of sine and cosine takes.
+const OPERATIONS_OF_SINES: usize = 25;
+/// Threads take states by the multiple: vectors have up to sixteen.
+const STATES_TOGETHER: usize = 16;
+
+/// Calls a function; its results in their order.
+///
+/// # Errors
+/// What is wrong with the arguments.
+pub fn call<'py, T: ArrayNumber>(
+    py: Python<'py>,
+    function: &LoadedFunction<T>,
+    arguments: &CallArguments<'py>,
+) -> PyResult<Vec<Bound<'py, PyAny>>> {
+    let (inputs, outputs) = (function.inputs(), function.outputs());
+    if arguments.out.is_none() {
+        let plain = inputs.iter().zip(&arguments.inputs).map(|(port, value)| as_it_is(port, value));
+        if let Some(plain) = plain.collect::<Option<Vec<PyReadonlyArray1<'py, T>>>>() {
+            return one_state(py, function, &plain);
+        }
+    }
+    let read = inputs.iter().zip(&arguments.inputs).map(|(port, value)| InputArray::read(port, value));
+    let read = read.collect::<PyResult<Vec<InputArray<'py, T>>>>()?;
+    let states = common_states(inputs, &read)?;
+    let borrowed = read.into_iter().zip(inputs).map(|(array, port)| array.borrow(port, &states));
+    let borrowed = borrowed.collect::<PyResult<Vec<BorrowedInput<'py, T>>>>()?;
+    let mut results = match &arguments.out {
+        Some(out) => OutputArray::given(out, outputs, &states)?,
+        None => outputs.iter().map(|port| OutputArray::fresh(py, port, &states)).collect::<PyResult<Vec<_>>>()?,
+    };
+    {
+        let numbers: Vec<(&[T], BatchLayout)> = borrowed.iter().map(BorrowedInput::numbers).collect();
+        let slices: Vec<&mut [T]> = results.iter_mut().map(OutputArray::numbers).collect();
+        let (count, threads) = (states.iter().product(), arguments.threads);
+        let run = || many_states(function, count, &numbers, slices, threads);
+        let is_long = count.saturating_mul(operations(function.counts())) > LONG;
+        let done = if is_long { py.detach(run) } else { run() };
+        done.map_err(broken)?;
+    }
+    Ok(results.into_iter().map(OutputArray::finish).collect())
+}
+
+fn operations(counts: Counts) -> usize {
+    counts.flops() + OPERATIONS_OF_SINES * counts.sin_cos
+}
+
+/// Of one state whose inputs are read as they are.
+fn one_state<'py, T: ArrayNumber>(
+    py: Python<'py>,
+    function: &LoadedFunction<T>,
+    inputs: &[PyReadonlyArray1<'py, T>],
+) -> PyResult<Vec<Bound<'py, PyAny>>> {
+    let inputs: Vec<&[T]> = inputs.iter().map(|array| array.as_slice().expect("it is contiguous")).collect();
+    let mut numbers = vec![T::default(); function.outputs().iter().map(|port| port.len()).sum()];
+    let mut rest = &mut numbers[..];
+    let mut slices: Vec<&mut [T]> = Vec::with_capacity(function.outputs().len());
+    for port in function.outputs() {
+        let (own, behind) = rest.split_at_mut(port.len());
+        slices.push(own);
+        rest = behind;
+    }
+    let mut run = || function.call(&inputs, &mut slices);
+    let done = if operations(function.counts()) > LONG { py.detach(run) } else { run() };
+    done.map_err(broken)?;
+    Ok(function.outputs().iter().zip(&slices).map(|(port, numbers)| result_of(py, port, numbers)).collect())
+}
+
+/// Of many states, which threads share: each takes some that follow one another.
+fn many_states<T: ArrayNumber>(
+    function: &LoadedFunction<T>,
+    states: usize,
+    inputs: &[(&[T], BatchLayout)],
+    mut results: Vec<&mut [T]>,
+    threads: usize,
+) -> Result<(), CallError> {
+    let lengths: Vec<usize> = function.outputs().iter().map(|port| port.len()).collect();
+    let share = states.div_ceil(threads.max(1)).next_multiple_of(STATES_TOGETHER);
+    if threads <= 1 || states <= share {
+        return some_states(function, states, inputs, results);
+    }
+    thread::scope(|scope| {
+        let mut running = Vec::new();
+        for first in (0..states).step_by(share) {
+            let count = share.min(states - first);
+            let inputs: Vec<(&[T], BatchLayout)> = inputs
+                .iter()
+                .map(|(numbers, layout)| (&numbers[(first * layout.by_state).min(numbers.len())..], *layout))
+                .collect();
+            let mut own: Vec<&mut [T]> = Vec::with_capacity(lengths.len());
+            for (rest, length) in results.iter_mut().zip(&lengths) {
+                let (slice, behind) = std::mem::take(rest).split_at_mut(count * length);
+                own.push(slice);
+                *rest = behind;
+            }
+            running.push(scope.spawn(move || some_states(function, count, &inputs, own)));
+        }
+        running.into_iter().try_for_each(|thread| thread.join().expect("no function panics"))
+    })
+}
+
+/// Of states that one thread takes; results row by row.
+fn some_states<T: ArrayNumber>(
+    function: &LoadedFunction<T>,
+    states: usize,
+    inputs: &[(&[T], BatchLayout)],
+    mut results: Vec<&mut [T]>,
+) -> Result<(), CallError> {
+    if states == 1 {
+        let numbers: Option<Vec<&[T]>> = inputs
+            .iter()
+            .zip(function.inputs())
+            .map(|((numbers, layout), port)| (layout.by_entry == 1 || port.len() == 1).then(|| &numbers[..port.len()]))
+            .collect();
+        if let Some(numbers) = numbers {
+            return function.call(&numbers, &mut results);
+        }
+    }
+    let rows =
+        results.into_iter().zip(function.outputs()).map(|(slice, port)| (slice, BatchLayout::states_of(port.len())));
+    function.batch(states, inputs, &mut rows.collect::<Vec<_>>())
+}
+
+/// Arguments were checked: what the function says of them is an error of ours.
+fn broken(error: CallError) -> PyErr {
+    PyRuntimeError::new_err(error.to_string())
+}

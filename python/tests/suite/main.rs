@@ -1,0 +1,57 @@
+//! The tests of the Python package, by a Python that has NumPy: `PYTHON`, or `python3`. Without one they are skipped.
+
+use std::path::{Path, PathBuf};
+use std::process::Command;
+use std::{env, fs};
+
+/// A Python with NumPy.
+fn python() -> Option<PathBuf> {
+    let python = env::var_os("PYTHON").map_or_else(|| PathBuf::from("python3"), PathBuf::from);
+    let check = "import sys, numpy; sys.exit(sys.version_info < (3, 9))";
+    let works = Command::new(&python).args(["-c", check]).output().is_ok_and(|output| output.status.success());
+    works.then_some(python)
+}
+
+/// The extension, which cargo builds beside this test.
+fn extension() -> PathBuf {
+    let (prefix, suffix) = (env::consts::DLL_PREFIX, env::consts::DLL_SUFFIX);
+    let name = format!("{prefix}straightline_python{suffix}");
+    let test = env::current_exe().expect("a test knows where it is");
+    let folder = test.parent().expect("a file is in a folder");
+    let places = [folder.join(&name), folder.with_file_name(&name)];
+    let built = places.into_iter().filter_map(|path| Some((fs::metadata(&path).ok()?.modified().ok()?, path)));
+    built.max().map(|(_, path)| path).unwrap_or_else(|| panic!("{name} was not built beside {}", test.display()))
+}
+
+/// The package as it is installed: Python's files, and the extension beside them.
+fn package(folder: &Path) {
+    let package = folder.join("straightline");
+    fs::create_dir_all(&package).expect("the folder can be made");
+    let sources = Path::new(env!("CARGO_MANIFEST_DIR")).join("python/straightline");
+    for entry in fs::read_dir(sources).expect("the sources are there") {
+        let path = entry.expect("the folder can be read").path();
+        if path.is_file() {
+            fs::copy(&path, package.join(path.file_name().expect("it is a file"))).expect("it can be copied");
+        }
+    }
+    let name = if cfg!(windows) { "_straightline.pyd" } else { "_straightline.abi3.so" };
+    fs::copy(extension(), package.join(name)).expect("the extension can be copied");
+}
+
+#[test]
+fn the_package_does_what_its_tests_say() {
+    let Some(python) = python() else {
+        println!("skipped: no Python 3.9 with NumPy (`PYTHON` names one)");
+        return;
+    };
+    let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join(format!("python-{}", std::process::id()));
+    package(&folder);
+    let tests = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests");
+    let mut command = Command::new(python);
+    command.args(["-B", "-m", "unittest", "discover", "--verbose", "--start-directory"]).arg(&tests);
+    let output = command.env("PYTHONPATH", &folder).current_dir(&folder).output().expect("Python starts");
+    let said = String::from_utf8_lossy(&output.stderr);
+    said.lines().filter(|line| line.contains("skipped")).for_each(|line| println!("{line}"));
+    let _ = fs::remove_dir_all(&folder);
+    assert!(output.status.success(), "{}\n{said}", String::from_utf8_lossy(&output.stdout));
+}
