@@ -7,7 +7,7 @@ use straightline_codegen::Function;
 use straightline_graph::expr::Port;
 
 /// Inputs and results of a function, as its program has them.
-pub struct Ports<'a> {
+pub struct FunctionPorts<'a> {
     /// What goes in.
     pub inputs: &'a [Port],
     /// What comes out.
@@ -15,7 +15,7 @@ pub struct Ports<'a> {
 }
 
 /// In the form of NumPy's docstrings.
-pub fn of_function(function: Function, ports: &Ports<'_>, scene: &Scene) -> String {
+pub fn of_function(function: Function, ports: &FunctionPorts<'_>, scene: &Scene) -> String {
     let spec = function.spec();
     let mut text = format!("{}\n", plain(spec.summary));
     if !spec.aliases.is_empty() {

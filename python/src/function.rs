@@ -3,7 +3,7 @@
 use crate::arguments::CallArguments;
 use crate::arrays::{result_of, ArrayNumber};
 use crate::call::call;
-use crate::documentation::{self, Ports};
+use crate::documentation::{self, FunctionPorts};
 use crate::errors::{self, RobotError};
 use crate::robot::PythonRobot;
 use pyo3::intern;
@@ -16,7 +16,7 @@ use straightline_graph::expr::{Counts, Port};
 use straightline_jit::{LoadedFunction, Robot};
 
 /// A function that can be executed, in its robot's numbers.
-pub enum Kernel {
+pub enum MadeFunction {
     /// In f32.
     F32(Robot<f32>),
     /// In f64.
@@ -24,14 +24,14 @@ pub enum Kernel {
 }
 
 /// What does not depend on the numbers.
-macro_rules! of_kernel {
-    ($kernel:expr, $function:ident => $value:expr) => {
-        match $kernel {
-            Kernel::F32(robot) => {
+macro_rules! of_made {
+    ($made:expr, $function:ident => $value:expr) => {
+        match $made {
+            MadeFunction::F32(robot) => {
                 let $function: &LoadedFunction<f32> = &robot.functions()[0];
                 $value
             }
-            Kernel::F64(robot) => {
+            MadeFunction::F64(robot) => {
                 let $function: &LoadedFunction<f64> = &robot.functions()[0];
                 $value
             }
@@ -39,17 +39,17 @@ macro_rules! of_kernel {
     };
 }
 
-impl Kernel {
+impl MadeFunction {
     fn inputs(&self) -> &[Port] {
-        of_kernel!(self, function => function.inputs())
+        of_made!(self, function => function.inputs())
     }
 
     fn outputs(&self) -> &[Port] {
-        of_kernel!(self, function => function.outputs())
+        of_made!(self, function => function.outputs())
     }
 
     fn counts(&self) -> Counts {
-        of_kernel!(self, function => function.counts())
+        of_made!(self, function => function.counts())
     }
 }
 
@@ -59,7 +59,7 @@ impl Kernel {
 pub struct PythonFunction {
     robot: Py<PythonRobot>,
     function: Function,
-    kernel: OnceLock<Kernel>,
+    made: OnceLock<MadeFunction>,
     /// The type of several results.
     results: PyOnceLock<Py<PyAny>>,
 }
@@ -67,28 +67,28 @@ pub struct PythonFunction {
 impl PythonFunction {
     /// One that is not compiled yet.
     pub fn new(robot: Py<PythonRobot>, function: Function) -> PythonFunction {
-        PythonFunction { robot, function, kernel: OnceLock::new(), results: PyOnceLock::new() }
+        PythonFunction { robot, function, made: OnceLock::new(), results: PyOnceLock::new() }
     }
 
     /// What executes it.
-    fn kernel(&self, py: Python<'_>) -> PyResult<&Kernel> {
-        match self.kernel.get() {
-            Some(kernel) => Ok(kernel),
+    fn made(&self, py: Python<'_>) -> PyResult<&MadeFunction> {
+        match self.made.get() {
+            Some(made) => Ok(made),
             None => self.make(py),
         }
     }
 
     /// Compiles it, unless another thread has meanwhile.
     #[cold]
-    fn make(&self, py: Python<'_>) -> PyResult<&Kernel> {
+    fn make(&self, py: Python<'_>) -> PyResult<&MadeFunction> {
         let robot = self.robot.get();
         py.detach(|| {
             let _alone = robot.compiling().lock().unwrap_or_else(PoisonError::into_inner);
-            if self.kernel.get().is_none() {
-                let made = robot.make(self.function).map_err(|error| errors::of_load(&error))?;
-                let _ = self.kernel.set(made);
+            if self.made.get().is_none() {
+                let made = robot.make(self.function)?;
+                let _ = self.made.set(made);
             }
-            Ok(self.kernel.get().expect("it was made"))
+            Ok(self.made.get().expect("it was made"))
         })
     }
 
@@ -138,7 +138,7 @@ impl PythonFunction {
         args: &Bound<'py, PyTuple>,
         kwargs: Option<&Bound<'py, PyDict>>,
     ) -> PyResult<Bound<'py, PyAny>> {
-        of_kernel!(self.kernel(py)?, function => self.run(py, function, args, kwargs))
+        of_made!(self.made(py)?, function => self.run(py, function, args, kwargs))
     }
 
     /// It is called as an attribute of a robot, not of a class; `help` shows what has this method as it shows functions.
@@ -158,47 +158,47 @@ impl PythonFunction {
 
     #[getter]
     fn __doc__(&self, py: Python<'_>) -> PyResult<String> {
-        let kernel = self.kernel(py)?;
-        let ports = Ports { inputs: kernel.inputs(), outputs: kernel.outputs() };
+        let made = self.made(py)?;
+        let ports = FunctionPorts { inputs: made.inputs(), outputs: made.outputs() };
         let options = self.robot.get().options(&[self.function]);
         Ok(documentation::of_function(self.function, &ports, &options.scene))
     }
 
     #[getter]
     fn __signature__<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
-        let names: Vec<&str> = self.kernel(py)?.inputs().iter().map(|port| port.name.as_str()).collect();
+        let names: Vec<&str> = self.made(py)?.inputs().iter().map(|port| port.name.as_str()).collect();
         py.import("straightline._results")?.getattr("signature")?.call1((names,))
     }
 
     /// Names and shapes of what goes in.
     #[getter]
     fn inputs<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
-        PythonFunction::shapes(py, self.kernel(py)?.inputs())
+        PythonFunction::shapes(py, self.made(py)?.inputs())
     }
 
     /// Names and shapes of what comes out.
     #[getter]
     fn outputs<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
-        PythonFunction::shapes(py, self.kernel(py)?.outputs())
+        PythonFunction::shapes(py, self.made(py)?.outputs())
     }
 
     /// Operations but sines and cosines, and pairs of these.
     #[getter]
     fn cost(&self, py: Python<'_>) -> PyResult<(usize, usize)> {
-        let counts = self.kernel(py)?.counts();
+        let counts = self.made(py)?.counts();
         Ok((counts.flops(), counts.sin_cos))
     }
 
     /// The same if it is compiled already.
     #[getter]
     fn known_cost(&self) -> Option<(usize, usize)> {
-        self.kernel.get().map(|kernel| (kernel.counts().flops(), kernel.counts().sin_cos))
+        self.made.get().map(|made| (made.counts().flops(), made.counts().sin_cos))
     }
 
     /// How it is executed.
     #[getter]
     fn execution(&self, py: Python<'_>) -> PyResult<String> {
-        Ok(of_kernel!(self.kernel(py)?, function => function.execution().to_string()))
+        Ok(of_made!(self.made(py)?, function => function.execution().to_string()))
     }
 
     /// Certified bounds of the rounding errors of its results, for inputs in their ranges.
@@ -224,9 +224,9 @@ impl PythonFunction {
         format!("<function {} of the robot {:?}>", self.function.name(), self.robot.get().model.name)
     }
 
-    fn __reduce__<'py>(&self, py: Python<'py>) -> PyResult<(Bound<'py, PyAny>, (Py<PyTuple>, &'static str))> {
+    fn __reduce__<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyTuple>> {
         let of_state = py.import("straightline._robot")?.getattr("_function")?;
-        Ok((of_state, (self.robot.get().state.clone_ref(py), self.function.name())))
+        (of_state, (&self.robot.get().state, self.function.name())).into_pyobject(py)
     }
 
     fn __copy__(self_: Py<PythonFunction>) -> Py<PythonFunction> {

@@ -1,7 +1,7 @@
 //! A robot: what its file says, and what its functions are made of.
 
-use crate::errors;
-use crate::function::{Kernel, PythonFunction};
+use crate::errors::{self, RobotError};
+use crate::function::{MadeFunction, PythonFunction};
 use crate::options::{given_options, FRONT};
 use pyo3::exceptions::{PyAttributeError, PyKeyError};
 use pyo3::prelude::*;
@@ -18,7 +18,7 @@ use straightline_codegen::{Function, Generated, Robot as RobotEquations, Scalar}
 use straightline_core::model::Model;
 use straightline_core::Dd;
 use straightline_graph::expr::{self, Graph};
-use straightline_jit::{ExecutionMode, LoadError, Number, Robot};
+use straightline_jit::{ExecutionMode, Number, Robot};
 
 /// Names of all functions that robots can have, each with what it computes, its inputs and its results.
 #[pyfunction]
@@ -61,20 +61,23 @@ impl PythonRobot {
         options(&self.scene, &self.settings, functions)
     }
 
-    /// Makes a function, with no thread of Python waiting but those that want one, too.
+    /// Makes a function.
     ///
     /// # Errors
     /// What the compiler complains of.
-    pub fn make(&self, function: Function) -> Result<Kernel, LoadError> {
+    pub fn make(&self, function: Function) -> PyResult<MadeFunction> {
         let options = self.options(&[function]);
         match self.scalar {
-            Scalar::F32 => self.load(&options).map(Kernel::F32),
-            _ => self.load(&options).map(Kernel::F64),
+            Scalar::F32 => self.load(function, &options).map(MadeFunction::F32),
+            _ => self.load(function, &options).map(MadeFunction::F64),
         }
     }
 
-    fn load<T: Number>(&self, options: &Options) -> Result<Robot<T>, LoadError> {
-        Robot::load(&self.source, options)
+    fn load<T: Number>(&self, function: Function, options: &Options) -> PyResult<Robot<T>> {
+        let robot = Robot::load(&self.source, options).map_err(|error| errors::of_load(&error))?;
+        let none = || RobotError::new_err(format!("nothing is left of `{}` in this scene", function.name()));
+        robot.function(function.name()).map_err(|_| none())?;
+        Ok(robot)
     }
 
     /// Keeps others from compiling meanwhile.
