@@ -51,3 +51,6 @@ pub mod internals {
 
 /// Version of the generator, as it stands in generated files.
 pub const VERSION: &str = env!("CARGO_PKG_VERSION");
+
+/// A hash of the sources of this compiler: builds of different ones may make different programs, also where they have the same version.
+pub const SOURCES: &str = env!("STRAIGHTLINE_SOURCES");

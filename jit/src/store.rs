@@ -101,13 +101,18 @@ impl ProgramStore for ProgramFolder {
     }
 }
 
+/// The version, and the sources: a compiler that is being changed has the same version for long.
+fn version() -> String {
+    format!("{} {}", straightline_codegen::VERSION, straightline_codegen::SOURCES)
+}
+
 fn written(key: u64, graph: &Graph) -> postcard::Result<Vec<u8>> {
-    let version = straightline_codegen::VERSION.to_string();
+    let version = version();
     postcard::to_stdvec_crc32(&StoredProgram { version, key, graph }, CHECKSUM.digest())
 }
 
 fn read(bytes: &[u8], key: u64) -> Option<Graph> {
     let stored: StoredProgram<Graph> = postcard::from_bytes_crc32(bytes, CHECKSUM.digest()).ok()?;
-    let is_mine = stored.version == straightline_codegen::VERSION && stored.key == key;
+    let is_mine = stored.version == version() && stored.key == key;
     is_mine.then(|| stored.graph.without_notes())
 }
