@@ -5,7 +5,6 @@ use crate::arrays::{as_it_is, common_states, result_of, ArrayNumber, BorrowedInp
 use numpy::PyReadonlyArray1;
 use pyo3::exceptions::PyRuntimeError;
 use pyo3::prelude::*;
-use std::thread;
 use straightline_graph::expr::Counts;
 use straightline_jit::{BatchLayout, CallError, LoadedFunction};
 
@@ -13,8 +12,6 @@ use straightline_jit::{BatchLayout, CallError, LoadedFunction};
 const LONG: usize = 20_000;
 /// As many operations a pair of sine and cosine takes.
 const OPERATIONS_OF_SINES: usize = 25;
-/// Threads take states by the multiple: vectors have up to sixteen.
-const STATES_TOGETHER: usize = 16;
 
 /// Calls a function; its results in their order.
 ///
@@ -78,45 +75,13 @@ fn one_state<'py, T: ArrayNumber>(
     Ok(function.outputs().iter().zip(&slices).map(|(port, numbers)| result_of(py, port, numbers)).collect())
 }
 
-/// Of many states, which threads share: each takes some that follow one another.
+/// Of many states, which threads share; results row by row.
 fn many_states<T: ArrayNumber>(
     function: &LoadedFunction<T>,
     states: usize,
     inputs: &[(&[T], BatchLayout)],
     mut results: Vec<&mut [T]>,
     threads: usize,
-) -> Result<(), CallError> {
-    let lengths: Vec<usize> = function.outputs().iter().map(|port| port.len()).collect();
-    let share = states.div_ceil(threads.max(1)).next_multiple_of(STATES_TOGETHER);
-    if threads <= 1 || states <= share {
-        return some_states(function, states, inputs, results);
-    }
-    thread::scope(|scope| {
-        let mut running = Vec::new();
-        for first in (0..states).step_by(share) {
-            let count = share.min(states - first);
-            let inputs: Vec<(&[T], BatchLayout)> = inputs
-                .iter()
-                .map(|(numbers, layout)| (&numbers[(first * layout.by_state).min(numbers.len())..], *layout))
-                .collect();
-            let mut own: Vec<&mut [T]> = Vec::with_capacity(lengths.len());
-            for (rest, length) in results.iter_mut().zip(&lengths) {
-                let (slice, behind) = std::mem::take(rest).split_at_mut(count * length);
-                own.push(slice);
-                *rest = behind;
-            }
-            running.push(scope.spawn(move || some_states(function, count, &inputs, own)));
-        }
-        running.into_iter().try_for_each(|thread| thread.join().expect("no function panics"))
-    })
-}
-
-/// Of states that one thread takes; results row by row.
-fn some_states<T: ArrayNumber>(
-    function: &LoadedFunction<T>,
-    states: usize,
-    inputs: &[(&[T], BatchLayout)],
-    mut results: Vec<&mut [T]>,
 ) -> Result<(), CallError> {
     if states == 1 {
         let numbers: Option<Vec<&[T]>> = inputs
@@ -130,7 +95,7 @@ fn some_states<T: ArrayNumber>(
     }
     let rows =
         results.into_iter().zip(function.outputs()).map(|(slice, port)| (slice, BatchLayout::states_of(port.len())));
-    function.batch(states, inputs, &mut rows.collect::<Vec<_>>())
+    function.batch_in_threads(threads, states, inputs, &mut rows.collect::<Vec<_>>())
 }
 
 /// Arguments were checked: what the function says of them is an error of ours.

@@ -6,6 +6,7 @@ use crate::options::{given_options, FRONT};
 use pyo3::exceptions::{PyAttributeError, PyKeyError};
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyTuple};
+use std::path::PathBuf;
 use std::sync::Mutex;
 use straightline_cli::html;
 use straightline_codegen::compile::{compile, compile_programs, explain, CheckedPrograms};
@@ -13,12 +14,13 @@ use straightline_codegen::diagnostic::wording::did_you_mean;
 use straightline_codegen::diagnostic::{Diagnostics, Reporting, Severity, Source};
 use straightline_codegen::options::{scene_file, GivenOptions, OptionValue, Options, SceneFile};
 use straightline_codegen::program::parameter::parameter_program;
+use straightline_codegen::program::stored::{NoStore, ProgramStore};
 use straightline_codegen::scene::Base;
 use straightline_codegen::{Function, Generated, Robot as RobotEquations, Scalar};
 use straightline_core::model::Model;
 use straightline_core::Dd;
 use straightline_graph::expr::{self, Graph};
-use straightline_jit::{ExecutionMode, Number, Robot};
+use straightline_jit::{ExecutionMode, Number, ProgramFolder, Robot};
 
 /// Names of all functions that robots can have, each with what it computes, its inputs and its results.
 #[pyfunction]
@@ -48,6 +50,8 @@ pub struct PythonRobot {
     /// Functions that were named.
     named: Vec<Function>,
     warnings: Diagnostics,
+    /// Where programs are kept.
+    folder: Option<ProgramFolder>,
     /// What it was made of, for copies in other processes.
     pub state: Py<PyTuple>,
     /// Held while a function is compiled: compiling takes memory, and one function is not compiled twice.
@@ -74,7 +78,9 @@ impl PythonRobot {
     }
 
     fn load<T: Number>(&self, function: Function, options: &Options) -> PyResult<Robot<T>> {
-        let robot = Robot::load(&self.source, options).map_err(|error| errors::of_load(&error))?;
+        let store = self.folder.as_ref().map_or(&NoStore as &dyn ProgramStore, |folder| folder);
+        let robot = Robot::load_by(&self.source, options, ExecutionMode::best(), store);
+        let robot = robot.map_err(|error| errors::of_load(&error))?;
         let none = || RobotError::new_err(format!("nothing is left of `{}` in this scene", function.name()));
         robot.function(function.name()).map_err(|_| none())?;
         Ok(robot)
@@ -148,12 +154,17 @@ fn functions_of(model: &Model<Dd>, frames: &[String], options: &Options) -> Vec<
 
 #[pymethods]
 impl PythonRobot {
-    /// From (path, text of the robot file, None or path and text of the scene file, options).
+    /// From (path, text of the robot file, None or path and text of the scene file, options, where programs are kept: None, a path, or "" for the
+    /// user's folder).
     #[new]
     fn new(py: Python<'_>, state: Bound<'_, PyTuple>) -> PyResult<PythonRobot> {
         type File = (String, Vec<u8>);
-        type Given<'py> = (String, Vec<u8>, Option<File>, Vec<(String, Bound<'py, PyAny>)>);
-        let (path, text, scene, given): Given<'_> = state.extract()?;
+        type Given<'py> = (String, Vec<u8>, Option<File>, Vec<(String, Bound<'py, PyAny>)>, Option<PathBuf>);
+        let (path, text, scene, given, folder): Given<'_> = state.extract()?;
+        let folder = folder.and_then(|path| match path.as_os_str().is_empty() {
+            true => ProgramFolder::of_user(),
+            false => Some(ProgramFolder::new(path)),
+        });
         let keywords = PyDict::new(py);
         given.iter().try_for_each(|(name, value)| keywords.set_item(name, value))?;
         let settings = given_options(&keywords)?;
@@ -182,6 +193,7 @@ impl PythonRobot {
                 functions,
                 named,
                 warnings,
+                folder,
                 state,
                 compiling,
             })

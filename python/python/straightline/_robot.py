@@ -19,7 +19,7 @@ class RobotWarning(UserWarning):
     """What is doubtful in a robot file: the text says what was assumed."""
 
 
-def load(robot, *, scene=None, dtype=None, **options):
+def load(robot, *, scene=None, dtype=None, cache=True, **options):
     """The robot of a file in URDF, MJCF, SDF or TOML.
 
     Parameters
@@ -30,8 +30,11 @@ def load(robot, *, scene=None, dtype=None, **options):
         What is wanted of the robot and what is held, in TOML.
     dtype : optional
         ``numpy.float64`` or ``numpy.float32``: the numbers of inputs and results.
+    cache : bool or path, optional
+        The folder where programs are kept for the next time; they are checked again then. ``True`` is a folder of the user, ``False`` none.
     **options
         Options of the compiler by their names: ``frames=["tool"]``, ``gravity=(0, 0, -1.62)``, ``floating_base=True``, ...
+        ``optimise="quick"`` compiles in milliseconds, to a few more operations and other last bits.
         ``functions=["inverse_dynamics"]`` compiles these functions at once; others are compiled when they are first used.
 
     Raises
@@ -46,7 +49,8 @@ def load(robot, *, scene=None, dtype=None, **options):
         if "scalar" in given:
             raise TypeError("`dtype` and `scalar` say the same: give one of them")
         given["scalar"] = _scalar(dtype)
-    state = (*_file(robot, "robot"), None if scene is None else _file(scene, "scene"), tuple(sorted(given.items())))
+    scene = None if scene is None else _file(scene, "scene")
+    state = (*_file(robot, "robot"), scene, tuple(sorted(given.items())), _folder(cache))
     made = Robot(state)
     for name in made._loaded.named:
         made.cost[name]
@@ -81,6 +85,16 @@ def _file(given, what):
     path = os.fspath(given)
     with open(path, "rb") as file:
         return os.fsdecode(path), file.read()
+
+
+def _folder(cache):
+    """Where programs are kept: None, a path, or "" for the folder of whoever runs this."""
+    if cache is None or isinstance(cache, (bool, np.bool_)):
+        return "" if cache else None
+    if not isinstance(cache, (str, os.PathLike)):
+        raise TypeError(f"`cache` is a {type(cache).__name__}; True, False or a path is expected")
+    path = os.path.abspath(os.fspath(cache))
+    return os.fsdecode(path)
 
 
 class _OfFunctions(Mapping):
