@@ -8,7 +8,7 @@ use numpy::{
     BorrowError, Element, IxDyn, PyArray, PyArrayDyn, PyArrayMethods, PyReadonlyArrayDyn, PyReadwriteArrayDyn,
     PyUntypedArray, PyUntypedArrayMethods,
 };
-use numpy::{PyArray1, PyArrayDescrMethods, PyReadonlyArray1};
+use numpy::{PyArray1, PyArrayDescrMethods};
 use pyo3::exceptions::{PyTypeError, PyValueError};
 use pyo3::intern;
 use pyo3::prelude::*;
@@ -22,11 +22,12 @@ pub trait ArrayNumber: Number + Element {}
 impl ArrayNumber for f32 {}
 impl ArrayNumber for f64 {}
 
-/// The input of one state, where it can be read as it is: what most calls give.
-pub fn as_it_is<'py, T: ArrayNumber>(port: &Port, value: &Bound<'py, PyAny>) -> Option<PyReadonlyArray1<'py, T>> {
+/// The numbers of an input of one state, if it is a row of them as it is: what most calls give. To copy a few numbers takes less than to keep
+/// others from writing to them.
+pub fn row<T: ArrayNumber>(port: &Port, value: &Bound<'_, PyAny>) -> Option<Vec<T>> {
     let array = value.cast::<PyArray1<T>>().ok()?;
-    let fits = port.shape.len() == 1 && array.len() == port.shape[0] && array.is_c_contiguous() && array.is_aligned();
-    fits.then(|| array.try_readonly().ok()).flatten()
+    let fits = port.shape.len() == 1 && array.len() == port.shape[0] && array.is_aligned();
+    fits.then(|| array.to_vec().ok()).flatten()
 }
 
 /// An input for one state or many.
@@ -256,14 +257,34 @@ impl<'py, T: ArrayNumber> OutputArray<'py, T> {
         if !object.is_aligned() {
             return Err(PyValueError::new_err(format!("`out` for `{name}` is not aligned")));
         }
-        let array = object.try_readwrite().map_err(|error| {
-            PyValueError::new_err(match error {
-                BorrowError::NotWriteable => format!("`out` for `{name}` is read-only"),
-                _ => format!("`out` for `{name}` overlaps an input or another result, or another call uses it"),
-            })
+        let array = object.try_readwrite().map_err(|error| match error {
+            BorrowError::NotWriteable => PyValueError::new_err(format!("`out` for `{name}` is read-only")),
+            _ => overlap(port),
         })?;
         let rows = (!object.is_c_contiguous()).then(|| vec![T::default(); object.len()]);
         Ok(OutputArray { object: object.clone(), array, rows })
+    }
+
+    /// Whether it has memory in common with an input that is a row of numbers.
+    ///
+    /// # Errors
+    /// If it has.
+    pub fn is_apart(&self, port: &Port, input: &Bound<'py, PyAny>) -> PyResult<()> {
+        let Ok(input) = input.cast::<PyArrayDyn<T>>() else { return Ok(()) };
+        let bytes = |array: &Bound<'py, PyArrayDyn<T>>| {
+            let first = array.data() as usize;
+            first..first + array.len() * T::BYTES
+        };
+        let (input, own) = (bytes(input), bytes(&self.object));
+        match input.start < own.end && own.start < input.end {
+            true => Err(overlap(port)),
+            false => Ok(()),
+        }
+    }
+
+    /// Whether results are written to it directly.
+    pub fn is_row_by_row(&self) -> bool {
+        self.rows.is_none()
     }
 
     /// Where results are written, row by row.
@@ -283,6 +304,11 @@ impl<'py, T: ArrayNumber> OutputArray<'py, T> {
         }
         self.object.into_any()
     }
+}
+
+fn overlap(port: &Port) -> PyErr {
+    let name = &port.name;
+    PyValueError::new_err(format!("`out` for `{name}` overlaps an input or another result, or another call uses it"))
 }
 
 fn list(shape: &[usize]) -> String {

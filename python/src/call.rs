@@ -1,8 +1,7 @@
 //! A call of a function, for one state or many.
 
 use crate::arguments::CallArguments;
-use crate::arrays::{as_it_is, common_states, result_of, ArrayNumber, BorrowedInput, InputArray, OutputArray};
-use numpy::PyReadonlyArray1;
+use crate::arrays::{common_states, result_of, row, ArrayNumber, BorrowedInput, InputArray, OutputArray};
 use pyo3::exceptions::PyRuntimeError;
 use pyo3::prelude::*;
 use straightline_graph::expr::Counts;
@@ -23,10 +22,17 @@ pub fn call<'py, T: ArrayNumber>(
     arguments: &CallArguments<'py>,
 ) -> PyResult<Vec<Bound<'py, PyAny>>> {
     let (inputs, outputs) = (function.inputs(), function.outputs());
-    if arguments.out.is_none() {
-        let plain = inputs.iter().zip(&arguments.inputs).map(|(port, value)| as_it_is(port, value));
-        if let Some(plain) = plain.collect::<Option<Vec<PyReadonlyArray1<'py, T>>>>() {
-            return one_state(py, function, &plain);
+    let rows = inputs.iter().zip(&arguments.inputs).map(|(port, value)| row(port, value));
+    if let Some(rows) = rows.collect::<Option<Vec<Vec<T>>>>() {
+        let rows: Vec<&[T]> = rows.iter().map(Vec::as_slice).collect();
+        match &arguments.out {
+            None => return one_state(py, function, &rows),
+            Some(out) => {
+                let results = OutputArray::given(out, outputs, &[])?;
+                if results.iter().all(OutputArray::is_row_by_row) {
+                    return one_state_into(py, function, (&rows, &arguments.inputs), results);
+                }
+            }
         }
     }
     let read = inputs.iter().zip(&arguments.inputs).map(|(port, value)| InputArray::read(port, value));
@@ -54,13 +60,12 @@ fn operations(counts: Counts) -> usize {
     counts.flops() + OPERATIONS_OF_SINES * counts.sin_cos
 }
 
-/// Of one state whose inputs are read as they are.
+/// Of one state.
 fn one_state<'py, T: ArrayNumber>(
     py: Python<'py>,
     function: &LoadedFunction<T>,
-    inputs: &[PyReadonlyArray1<'py, T>],
+    inputs: &[&[T]],
 ) -> PyResult<Vec<Bound<'py, PyAny>>> {
-    let inputs: Vec<&[T]> = inputs.iter().map(|array| array.as_slice().expect("it is contiguous")).collect();
     let mut numbers = vec![T::default(); function.outputs().iter().map(|port| port.len()).sum()];
     let mut rest = &mut numbers[..];
     let mut slices: Vec<&mut [T]> = Vec::with_capacity(function.outputs().len());
@@ -69,10 +74,34 @@ fn one_state<'py, T: ArrayNumber>(
         slices.push(own);
         rest = behind;
     }
-    let mut run = || function.call(&inputs, &mut slices);
-    let done = if operations(function.counts()) > LONG { py.detach(run) } else { run() };
-    done.map_err(broken)?;
+    run_once(py, function, inputs, &mut slices)?;
     Ok(function.outputs().iter().zip(&slices).map(|(port, numbers)| result_of(py, port, numbers)).collect())
+}
+
+/// Of one state, whose inputs were copied from these arrays, into arrays of the caller.
+fn one_state_into<'py, T: ArrayNumber>(
+    py: Python<'py>,
+    function: &LoadedFunction<T>,
+    (inputs, arrays): (&[&[T]], &[Bound<'py, PyAny>]),
+    mut results: Vec<OutputArray<'py, T>>,
+) -> PyResult<Vec<Bound<'py, PyAny>>> {
+    for (port, result) in function.outputs().iter().zip(&results) {
+        arrays.iter().try_for_each(|array| result.is_apart(port, array))?;
+    }
+    let mut slices: Vec<&mut [T]> = results.iter_mut().map(OutputArray::numbers).collect();
+    run_once(py, function, inputs, &mut slices)?;
+    Ok(results.into_iter().map(OutputArray::finish).collect())
+}
+
+fn run_once<T: ArrayNumber>(
+    py: Python<'_>,
+    function: &LoadedFunction<T>,
+    inputs: &[&[T]],
+    results: &mut [&mut [T]],
+) -> PyResult<()> {
+    let mut run = || function.call(inputs, results);
+    let done = if operations(function.counts()) > LONG { py.detach(run) } else { run() };
+    done.map_err(broken)
 }
 
 /// Of many states, which threads share; results row by row.

@@ -165,6 +165,13 @@ class Calls(unittest.TestCase):
         q, qd, qdd = self.many
         with self.expect(ValueError, "`tau`", "overlaps"):
             call(q, qd, qdd, out=q)
+        one = q[0].copy()
+        with self.expect(ValueError, "`tau`", "overlaps"):
+            call(qd[0], one, qdd[0], out=one)
+        line = np.zeros(20)
+        with self.expect(ValueError, "`tau`", "overlaps"):
+            call(line[:7], one, one, out=line[6:13])
+        np.testing.assert_array_equal(call(line[:7], one, one, out=line[7:14]), call(np.zeros(7), one, one))
         both = np.zeros((10, 7))
         both[:5] = q
         with self.expect(ValueError, "`tau`", "overlaps"):
