@@ -11,6 +11,7 @@ use pyo3::prelude::*;
 use pyo3::sync::PyOnceLock;
 use pyo3::types::{PyDict, PyTuple};
 use std::sync::{OnceLock, PoisonError};
+use straightline_codegen::diagnostic::Diagnostics;
 use straightline_codegen::Function;
 use straightline_graph::expr::{Counts, Port};
 use straightline_jit::{LoadedFunction, Robot};
@@ -51,6 +52,13 @@ impl MadeFunction {
     fn counts(&self) -> Counts {
         of_made!(self, function => function.counts())
     }
+
+    fn warnings(&self) -> &Diagnostics {
+        match self {
+            MadeFunction::F32(robot) => robot.warnings(),
+            MadeFunction::F64(robot) => robot.warnings(),
+        }
+    }
 }
 
 // A function of a robot. It is compiled when it is called or asked about for the first time. The documentation of a class would hide that of
@@ -78,18 +86,25 @@ impl PythonFunction {
         }
     }
 
-    /// Compiles it, unless another thread has meanwhile.
+    /// Compiles it, unless another thread has meanwhile, and says what is doubtful about it.
     #[cold]
     fn make(&self, py: Python<'_>) -> PyResult<&MadeFunction> {
         let robot = self.robot.get();
-        py.detach(|| {
+        let warnings = py.detach(|| {
             let _alone = robot.compiling().lock().unwrap_or_else(PoisonError::into_inner);
-            if self.made.get().is_none() {
-                let made = robot.make(self.function)?;
-                let _ = self.made.set(made);
+            if self.made.get().is_some() {
+                return Ok(None);
             }
-            Ok(self.made.get().expect("it was made"))
-        })
+            let made = robot.make(self.function)?;
+            let warnings = robot.further_warnings(made.warnings());
+            let _ = self.made.set(made);
+            Ok::<_, PyErr>(warnings)
+        })?;
+        if let Some(text) = warnings {
+            let category = py.import("straightline._robot")?.getattr("RobotWarning")?;
+            py.import("warnings")?.call_method1("warn", (text, category))?;
+        }
+        Ok(self.made.get().expect("it was made"))
     }
 
     /// One result is an array; several are a tuple with names.

@@ -86,6 +86,12 @@ impl PythonRobot {
         Ok(robot)
     }
 
+    /// What is doubtful about a function, but was not said when the robot was loaded.
+    pub fn further_warnings(&self, said: &Diagnostics) -> Option<String> {
+        let further = said.without(|diagnostic| self.warnings.iter().any(|known| known == diagnostic));
+        (further.count(Severity::Warning) > 0).then(|| further.render().trim_end().to_string())
+    }
+
     /// Keeps others from compiling meanwhile.
     pub fn compiling(&self) -> &Mutex<()> {
         &self.compiling

@@ -116,6 +116,23 @@ class Robot(unittest.TestCase):
             sl.load(DOUBTFUL, allow=["warnings"])
 
 
+    def test_what_is_doubtful_about_a_function_is_said_when_it_is_compiled(self):
+        light = PENDULUM.replace('mass value="2"', 'mass value="0"')
+        for entry in ('ixx="0.2"', 'iyy="0.3"', 'izz="0.15"'):
+            light = light.replace(entry, entry[:5] + '0"')
+        scene = "[[parameter]]\nkind = \"payload\"\nname = \"load\"\nframe = \"rod\"\n"
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", sl.RobotWarning)
+            robot = sl.load(light, scene=scene)
+        load = robot.parameter("load", mass=2.0, com=[0, 0, -0.5], inertia=[0.2, 0, 0, 0.3, 0, 0.15])
+        with self.assertWarnsRegex(sl.RobotWarning, "`load`"):
+            qdd = robot.forward_dynamics(0.0, 0.0, 0.8, load)
+        np.testing.assert_allclose(qdd, [1.0], rtol=1e-14)
+        with warnings.catch_warnings():
+            warnings.simplefilter("error")
+            robot.forward_dynamics(0.0, 0.0, 0.8, load)
+
+
 class Hostile(unittest.TestCase):
     def test_names_are_escaped(self):
         name = "&lt;script&gt;alert(1)&lt;/script&gt;&amp;&quot;\u202e"
