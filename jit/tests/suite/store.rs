@@ -15,6 +15,9 @@ use straightline_jit::{ExecutionMode, ProgramFolder, Robot};
 const UR5: &str = include_str!("../../../robots/descriptions/ur5.urdf");
 const FUNCTIONS: [Function; 3] = [Function::InverseDynamics, Function::ForwardDynamics, Function::ForwardKinematics];
 
+/// What is done to something.
+type Change<T> = fn(&mut T);
+
 fn source() -> Source {
     Source::new("ur5.urdf", UR5)
 }
@@ -134,12 +137,12 @@ fn what_is_damaged_is_thrown_away_and_made_again() {
     let wanted = bits(&loaded(&store, &alone));
     let file = files(folder.path()).remove(0);
     let whole = fs::read(&file).expect("it is there");
-    let damages: [&dyn Fn(&mut Vec<u8>); 5] = [
-        &|bytes| bytes.clear(),
-        &|bytes| bytes.truncate(bytes.len() / 2),
-        &|bytes| bytes[40] ^= 1,
-        &|bytes| *bytes.last_mut().expect("it has bytes") ^= 0x80,
-        &|bytes| bytes.fill(0xFF),
+    let damages: [Change<Vec<u8>>; 5] = [
+        Vec::clear,
+        |bytes| bytes.truncate(bytes.len() / 2),
+        |bytes| bytes[40] ^= 1,
+        |bytes| *bytes.last_mut().expect("it has bytes") ^= 0x80,
+        |bytes| bytes.fill(0xFF),
     ];
     for damage in damages {
         let mut bytes = whole.clone();
@@ -161,7 +164,7 @@ fn what_is_damaged_is_thrown_away_and_made_again() {
 /// A store that gives something else than what was made.
 struct Tampered {
     graph: Mutex<Option<Graph>>,
-    with: fn(&mut Graph),
+    with: Change<Graph>,
 }
 
 impl ProgramStore for Tampered {
@@ -180,7 +183,7 @@ impl ProgramStore for Tampered {
 #[test]
 fn what_was_tampered_with_is_not_taken() {
     let alone = Options { functions: vec![Function::InverseDynamics], ..options() };
-    let tampered: [(&str, fn(&mut Graph)); 8] = [
+    let tampered: [(&str, Change<Graph>); 8] = [
         ("a constant", |graph| {
             let a_constant = |op: &&mut Op| matches!(op, Op::Constant(c) if c.value().hi().abs() > 1e-3);
             let op = graph.ops.iter_mut().find(a_constant).expect("there are constants");
