@@ -101,8 +101,10 @@ pub fn bench(a: &Bench) -> Result<(), CommandFailure> {
     excess.map_or(Ok(()), |why| Err(print::failure(why)))
 }
 
-/// The robot, and how long it took \[ms\]: made, and kept in a folder.
-fn loaded<T: Number>(source: &Source, options: &Options) -> Result<(Robot<T>, (f64, Option<f64>)), CommandFailure> {
+/// How long it takes to load a robot \[ms\]: made, and kept in a folder.
+type LoadTimes = (f64, Option<f64>);
+
+fn loaded<T: Number>(source: &Source, options: &Options) -> Result<(Robot<T>, LoadTimes), CommandFailure> {
     let load = |store: &dyn ProgramStore| {
         let start = Instant::now();
         let robot =
@@ -130,7 +132,7 @@ fn loaded<T: Number>(source: &Source, options: &Options) -> Result<(Robot<T>, (f
 fn measured<T: Number>(
     robot: &Robot<T>,
     verification: Verification,
-    (milliseconds_to_load, milliseconds_to_load_kept): (f64, Option<f64>),
+    (milliseconds_to_load, milliseconds_to_load_kept): LoadTimes,
 ) -> BenchReport {
     let Verification { robot: name, scalar, bound, functions: errors, .. } = verification;
     let execution = robot.functions().first().map_or_else(String::new, |f| f.execution().to_string());
