@@ -36,6 +36,7 @@
 //! | `fma = "caller"`: Compute a·b + c in one rounding, and by what: `"std"`, `"caller"` | the same bits everywhere |
 //! | `generic`: Functions take any scalar that is a `straightline::Real`; the output depends on the package `straightline` | the scalar type alone |
 //! | `rules = "exact"`: Which rewrite rules may be used: `"all"`, `"exact"` | `"all"` |
+//! | `optimise = "quick"`: How much is tried for programs of few operations; another tier has other bits: `"full"`, `"quick"` | `"full"` |
 //! | `forward_dynamics = "articulated-body"`: How forward dynamics is computed: `"cheaper"`, `"articulated-body"`, `"factorisation"` | `"cheaper"` |
 //! | `limbs = "auto"`: How identical limbs are computed: `"apart"`, `"lanes"`, `"auto"`, `"rolled"` | `"apart"` |
 //! | `columns = "apart"`: How columns that a function solves for are computed: `"auto"`, `"apart"`, `"lanes"` | `"auto"` |
