@@ -1,15 +1,21 @@
-//! The tests of the Python package, by a Python that has NumPy: `PYTHON`, or `python3`. Without one they are skipped.
+//! The tests of the Python package, by a Python that has NumPy: `PYTHON`, or that of `python/environment`, or `python3`. Without one they are skipped.
 
 use std::path::{Path, PathBuf};
 use std::process::Command;
 use std::{env, fs};
 
-/// A Python with NumPy.
+/// A Python with NumPy: that of `PYTHON`, or what `environment` has made in the target directory, or `python3`.
 fn python() -> Option<PathBuf> {
-    let python = env::var_os("PYTHON").map_or_else(|| PathBuf::from("python3"), PathBuf::from);
     let check = "import sys, numpy; sys.exit(sys.version_info < (3, 9))";
-    let works = Command::new(&python).args(["-c", check]).output().is_ok_and(|output| output.status.success());
-    works.then_some(python)
+    let works = |python: &PathBuf| {
+        Command::new(python).args(["-c", check]).output().is_ok_and(|output| output.status.success())
+    };
+    if let Some(python) = env::var_os("PYTHON") {
+        return Some(PathBuf::from(python)).filter(works);
+    }
+    let test = env::current_exe().expect("a test knows where it is");
+    let made = test.ancestors().skip(1).map(|folder| folder.join("python/bin/python"));
+    made.filter(|python| python.exists()).chain([PathBuf::from("python3")]).find(works)
 }
 
 /// The extension, which cargo builds beside this test.
@@ -41,7 +47,7 @@ fn package(folder: &Path) {
 #[test]
 fn the_package_does_what_its_tests_say() {
     let Some(python) = python() else {
-        println!("skipped: no Python 3.9 with NumPy (`PYTHON` names one)");
+        println!("skipped: no Python 3.9 with NumPy (`python/environment` makes one, `PYTHON` names one)");
         return;
     };
     let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join(format!("python-{}", std::process::id()));
