@@ -5,6 +5,7 @@
 //! operations are one node, and applies the [rules] on the way in.
 
 mod builder;
+mod counts;
 mod gradient;
 mod graph;
 mod interpret;
@@ -15,10 +16,9 @@ mod short_loops;
 mod verify;
 
 pub use builder::GraphBuilder;
+pub use counts::{Counts, DIVISION, TAIL};
 pub use gradient::gradient;
-pub use graph::{
-    Alike, Constant, Counts, Graph, LoopLanes, NodeId, Note, Op, Port, Precision, Section, Sines, DIVISION, TAIL,
-};
+pub use graph::{Alike, Constant, Graph, LoopLanes, NodeId, Note, Op, Port, Precision, Section, Sines};
 pub(crate) use interpret::of_rounded_sum;
 pub use interpret::{evaluate, evaluate_by, values, values_by};
 pub use op::{Binary, Unary};
