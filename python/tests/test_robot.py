@@ -161,7 +161,7 @@ class Stubs(unittest.TestCase):
         classes = {node.name: node for node in body if isinstance(node, ast.ClassDef)}
         load = next(node for node in body if isinstance(node, ast.FunctionDef) and node.name == "load")
         known = {argument.arg for argument in load.args.kwonlyargs}
-        self.assertEqual(known, {"scene", "dtype"} | {name for name, _, _ in _straightline.option_table()})
+        self.assertEqual(known, {"scene", "dtype", "cache"} | {name for name, _, _ in _straightline.option_table()})
         self.assertEqual({*classes, "load"}, set(sl.__all__))
 
         def members(name):
