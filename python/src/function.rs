@@ -5,6 +5,7 @@ use crate::arrays::{result_of, ArrayNumber};
 use crate::call::call;
 use crate::documentation::{self, FunctionPorts};
 use crate::errors::{self, RobotError};
+use crate::forks::WithoutForks;
 use crate::robot::PythonRobot;
 use pyo3::intern;
 use pyo3::prelude::*;
@@ -91,6 +92,7 @@ impl PythonFunction {
     fn make(&self, py: Python<'_>) -> PyResult<&MadeFunction> {
         let robot = self.robot.get();
         let warnings = py.detach(|| {
+            let _unforked = WithoutForks::begin();
             let _alone = robot.compiling().lock().unwrap_or_else(PoisonError::into_inner);
             if self.made.get().is_some() {
                 return Ok(None);

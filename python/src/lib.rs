@@ -8,6 +8,7 @@ mod arrays;
 mod call;
 mod documentation;
 mod errors;
+mod forks;
 mod function;
 mod options;
 mod robot;
@@ -21,6 +22,8 @@ mod _straightline {
 
     #[pymodule_export]
     use super::errors::RobotError;
+    #[pymodule_export]
+    use super::forks::{after_fork, before_fork};
     #[pymodule_export]
     use super::function::PythonFunction;
     #[pymodule_export]

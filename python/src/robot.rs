@@ -269,6 +269,12 @@ impl PythonRobot {
         self.functions.iter().map(|function| function.name()).collect()
     }
 
+    /// Whether matrices are written column after column.
+    #[getter]
+    fn is_by_columns(&self) -> bool {
+        self.options(&[]).scene.by_columns
+    }
+
     /// Names of functions that were named by option `functions`.
     #[getter]
     fn named(&self) -> Vec<&'static str> {

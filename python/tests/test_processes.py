@@ -1,7 +1,9 @@
 """Other processes, other threads."""
 
 import multiprocessing
+import os
 import pickle
+import signal
 import sys
 import threading
 import time
@@ -58,6 +60,42 @@ class Processes(unittest.TestCase):
         context = multiprocessing.get_context("fork")
         with context.Pool(1) as pool:
             np.testing.assert_array_equal(pool.apply(torques, (robot, 0.5)), torques(robot, 0.5))
+
+
+    @unittest.skipUnless(hasattr(os, "fork"), "no fork")
+    def test_a_child_compiles_that_is_forked_while_threads_compile(self):
+        for _ in range(3):
+            robot = sl.load(ROBOTS / "panda.urdf", frames=["panda_hand_tcp"], cache=False)
+            names = ("inverse_dynamics_derivatives", "forward_dynamics_derivatives", "mass_matrix")
+            threads = [threading.Thread(target=lambda name=name: robot.cost[name]) for name in names]
+            for thread in threads:
+                thread.start()
+            # they hold the lock by now
+            time.sleep(0.02)
+            child = os.fork()
+            if child == 0:
+                status = 1
+                try:
+                    status = 0 if len(robot.gravity_force(np.zeros(7))) == 7 else 1
+                finally:
+                    os._exit(status)
+            status = _ended(child, seconds=60)
+            for thread in threads:
+                thread.join()
+            self.assertEqual(status, 0, "it waits for ever" if status is None else "it fails")
+
+
+def _ended(child, seconds):
+    """How a child has ended, or None; it does not run any more."""
+    until = time.monotonic() + seconds
+    while time.monotonic() < until:
+        ended, status = os.waitpid(child, os.WNOHANG)
+        if ended:
+            return os.waitstatus_to_exitcode(status)
+        time.sleep(0.01)
+    os.kill(child, signal.SIGKILL)
+    os.waitpid(child, 0)
+    return None
 
 
 class Threads(unittest.TestCase):

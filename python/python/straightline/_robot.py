@@ -11,6 +11,13 @@ import numpy as np
 
 from . import _straightline
 
+if hasattr(os, "register_at_fork"):
+    os.register_at_fork(
+        before=_straightline.before_fork,
+        after_in_parent=lambda: _straightline.after_fork(False),
+        after_in_child=lambda: _straightline.after_fork(True),
+    )
+
 Cost = namedtuple("Cost", ["operations", "sincos"])
 Cost.__doc__ = "Multiplications, additions, divisions and square roots of a function; and pairs of sine and cosine."
 
