@@ -30,6 +30,42 @@ MOVING = """<robot name="satellite">
 </robot>
 """
 
+# a ball joint between hinges; with a floating base there are two quaternions
+HANGING = """<robot name="hanging">
+    <link name="base"><inertial>
+        <origin xyz="0.1 -0.05 0.02"/><mass value="5"/>
+        <inertia ixx="0.3" iyy="0.4" izz="0.35" ixy="0.01" ixz="-0.02" iyz="0.03"/>
+    </inertial></link>
+    <joint name="shoulder" type="continuous">
+        <parent link="base"/><child link="upper"/><axis xyz="0 1 0"/><origin xyz="0 0.1 0.2" rpy="0.1 0.2 0.3"/>
+    </joint>
+    <link name="upper"><inertial>
+        <origin xyz="0.1 -0.05 0.02"/><mass value="3"/>
+        <inertia ixx="0.2" iyy="0.3" izz="0.25" ixy="0.01" ixz="-0.02" iyz="0.03"/>
+    </inertial></link>
+    <joint name="ball" type="spherical">
+        <parent link="upper"/><child link="lower"/><origin xyz="0.3 0.1 -0.2" rpy="0.4 -0.2 0.3"/>
+    </joint>
+    <link name="lower"><inertial>
+        <origin xyz="0.05 -0.02 0.3"/><mass value="2"/>
+        <inertia ixx="0.2" iyy="0.3" izz="0.15" ixy="0.01" ixz="-0.02" iyz="0.03"/>
+    </inertial></link>
+    <joint name="wrist" type="continuous">
+        <parent link="lower"/><child link="hand"/><axis xyz="0.6 0 0.8"/><origin xyz="0.1 0.1 0.2" rpy="0.1 0.2 0.3"/>
+    </joint>
+    <link name="hand"><inertial>
+        <origin xyz="0.1 -0.05 0.02"/><mass value="1"/>
+        <inertia ixx="0.05" iyy="0.06" izz="0.04" ixy="0.001" ixz="-0.002" iyz="0.003"/>
+    </inertial></link>
+</robot>
+"""
+
+
+@functools.lru_cache(maxsize=None)
+def hanging(floating_base=False):
+    """A robot with a ball joint, whose q has one quaternion or two."""
+    return sl.load(HANGING, floating_base=floating_base, optimise="quick")
+
 
 @functools.lru_cache(maxsize=None)
 def panda(dtype=np.float64):

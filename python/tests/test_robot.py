@@ -5,6 +5,8 @@ import copy
 import inspect
 import pathlib
 import pydoc
+import subprocess
+import sys
 import tempfile
 import unittest
 import warnings
@@ -175,6 +177,25 @@ class Stubs(unittest.TestCase):
         self.assertEqual(public | functions, {name for name in members("Robot") if not name.startswith("_")})
         of_function = {name for name in dir(sl.Function) if not name.startswith("_")}
         self.assertEqual(of_function, {name for name in members("Function") if not name.startswith("_")})
+
+    def test_stubs_of_modules_agree_with_them(self):
+        for name in ("torch", "jax"):
+            path = pathlib.Path(sl.__file__).with_name(f"{name}.py")
+            module, stub = (ast.parse(p.read_text(encoding="utf-8")).body for p in (path, path.with_suffix(".pyi")))
+            (public,) = [ast.literal_eval(node.value) for node in module if ast.unparse(node).startswith("__all__")]
+            kept = (ast.ClassDef, ast.FunctionDef)
+            self.assertEqual(sorted(node.name for node in stub if isinstance(node, kept)), public)
+            functions = [node for node in module + stub if isinstance(node, ast.FunctionDef)]
+            made = [node.args for node in functions if node.name == "differentiable"]
+            names = [[argument.arg for argument in arguments.args + arguments.kwonlyargs] for arguments in made]
+            self.assertEqual(names, [["robot", "threads"]] * 2)
+
+
+class Imports(unittest.TestCase):
+    def test_other_packages_are_imported_when_they_are_asked_for(self):
+        code = "import sys, straightline; print({'torch', 'jax', 'matplotlib'} & set(sys.modules))"
+        found = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+        self.assertEqual(found.stdout.strip(), "set()")
 
 
 if __name__ == "__main__":
