@@ -139,10 +139,8 @@ def _operator(mapping):
         for name, is_needed in zip(mapping.inputs, ctx.needs_input_grad):
             if is_needed and name not in found:
                 raise mapping.refusal_by(name)
-        return tuple(
-            found[name].sum_to_size(value.shape) if is_needed else None
-            for name, value, is_needed in zip(mapping.inputs, values, ctx.needs_input_grad)
-        )
+        # of one state that went with many, torch takes the sum
+        return tuple(found.get(name) for name in mapping.inputs)
 
     operator.register_autograd(backward, setup_context=keep)
     return operator
