@@ -1,6 +1,7 @@
 //! Arguments of a call: inputs by position or by name, `out` and `threads`.
 
 use pyo3::exceptions::{PyTypeError, PyValueError};
+use pyo3::intern;
 use pyo3::prelude::*;
 use pyo3::types::{PyBool, PyDict, PyString, PyTuple};
 use straightline_codegen::diagnostic::wording::did_you_mean;
@@ -55,6 +56,11 @@ impl<'py> CallArguments<'py> {
         let by_position = self.inputs.len();
         let mut named: Vec<Option<Bound<'py, PyAny>>> = vec![None; ports.len()];
         for (name, value) in names {
+            // as a name in a program mostly is; to make a text of it takes longer than the rest
+            if name.is(intern!(names.py(), "out")) {
+                self.out = (!value.is_none()).then_some(value);
+                continue;
+            }
             let name = name.cast::<PyString>()?.to_string();
             match ports.iter().position(|port| port.name == name) {
                 Some(k) if k < by_position => {
