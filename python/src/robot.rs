@@ -15,7 +15,7 @@ use straightline_codegen::diagnostic::{Diagnostics, Reporting, Severity, Source}
 use straightline_codegen::options::{scene_file, GivenOptions, OptionValue, Options, SceneFile};
 use straightline_codegen::program::parameter::parameter_program;
 use straightline_codegen::program::stored::{NoStore, ProgramStore};
-use straightline_codegen::scene::Base;
+use straightline_codegen::scene::{Base, Zero};
 use straightline_codegen::{Function, Generated, Robot as RobotEquations, Scalar};
 use straightline_core::model::Model;
 use straightline_core::Dd;
@@ -269,10 +269,15 @@ impl PythonRobot {
         self.functions.iter().map(|function| function.name()).collect()
     }
 
-    /// Whether matrices are written column after column.
+    /// What of the scene makes derivative functions other than the derivatives of functions, with what to do about it.
     #[getter]
-    fn is_by_columns(&self) -> bool {
-        self.options(&[]).scene.by_columns
+    fn undifferentiable(&self) -> Option<&'static str> {
+        let scene = self.options(&[]).scene;
+        if scene.by_columns {
+            return Some("matrices that are written by columns: leave `matrices` out of [outputs]");
+        }
+        let is_held = scene.zero != Zero::default();
+        is_held.then_some("velocities or accelerations that are held at zero: leave [zero] out, and give zeros")
     }
 
     /// Names of functions that were named by option `functions`.

@@ -125,6 +125,26 @@ class Matrices(unittest.TestCase):
             np.testing.assert_allclose(coordinates.along(q)[..., k], (ahead - behind) / (2 * STEP), rtol=0, atol=1e-9)
 
 
+    def test_inputs_that_a_scene_adds_are_held(self):
+        scene = '[hold]\ngravity = "input"\n[[parameter]]\nkind = "payload"\nname = "tool"\nframe = "tool0"\n'
+        robot = sl.load(ROBOTS / "ur5.urdf", scene=scene, optimise="quick", allow=["warnings"])
+        function = FunctionMap(robot, "inverse_dynamics")
+        self.assertEqual(list(function.inputs), ["q", "qd", "qdd", "gravity", "tool"])
+        given = inputs(robot, function.inputs, seed=8)
+        products, matrices = function.pullback(), function.matrices()
+        self.assertEqual(list(products.outputs), ["q", "qd", "qdd"])
+        found = dict(zip(products.outputs, products.call(*given.values(), np.ones(6))))
+        for (_, variable), matrix in zip(matrices.outputs, matrices.call(*given.values())):
+            (expected,) = differences(robot, function.call, given, variable)
+            self.assertNear(matrix, expected, given)
+            self.assertNear(found[variable], matrix.sum(axis=0), given, tolerance=1e-11)
+        function = FunctionMap(robot, "mass_matrix")
+        given = {port: given[port] for port in function.inputs}
+        self.assertEqual(list(given), ["q", "tool"])
+        (expected,) = differences(robot, function.call, given, "q")
+        self.assertNear(function.matrices().call(*given.values())[0], expected, given)
+
+
 class Refusals(unittest.TestCase):
     def refused(self, robot, name, *words):
         with self.assertRaises(NotDifferentiable) as caught:
@@ -138,12 +158,24 @@ class Refusals(unittest.TestCase):
 
     def test_scenes_that_change_matrices(self):
         by_columns = sl.load(PENDULUM, scene='[outputs]\nmatrices = "by columns"\n')
-        self.refused(by_columns, "gravity_force", "by rows")
+        self.refused(by_columns, "gravity_force", "by columns: leave `matrices` out")
+        at_rest = sl.load(ROBOTS / "ur5.urdf", scene="[zero]\nqd = true\n", optimise="quick", allow=["warnings"])
+        for name in ("mass_matrix", "inverse_dynamics"):
+            self.refused(at_rest, name, "leave [zero] out")
         scene = '[outputs]\nforward_kinematics = { part = "linear" }\n'
         self.refused(sl.load(PENDULUM, scene=scene), "forward_kinematics", "poses")
         scene = '[outputs]\ninverse_dynamics_derivatives = { results = ["dtau_dq"] }\n'
         with self.assertRaisesRegex(NotDifferentiable, "by `qd` is left out"):
             FunctionMap(sl.load(PENDULUM, scene=scene), "inverse_dynamics").matrices()
+        scene = '[outputs]\ninverse_dynamics = { joints = ["panda_joint2"] }\n'
+        of_one = sl.load(ROBOTS / "panda.urdf", scene=scene, optimise="quick")
+        self.refused(of_one, "inverse_dynamics", "by `q` has shape (7, 7)", "(1, 7) is needed")
+
+    def test_second_derivatives_of_which_a_scene_leaves_a_part(self):
+        scene = '[outputs]\ninverse_dynamics_hvp = { results = ["hvp_q"] }\n'
+        first = FunctionMap(sl.load(PENDULUM, scene=scene), "inverse_dynamics").pullback()
+        with self.assertRaisesRegex(NotDifferentiable, "all results of `inverse_dynamics_hvp`"):
+            first.pullback()
 
     def test_closed_loops(self):
         loop = ROOT / "generated_tests" / "reference" / "joints" / "robots" / "loop_fourbar.xml"

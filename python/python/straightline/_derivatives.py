@@ -197,9 +197,10 @@ class FunctionMap(Map):
         function = getattr(self.robot, name)
 
         def call(inputs):
-            # what it takes beside the function's own inputs are accelerations, which do not matter
-            given = {port: inputs[port] if port in inputs else np.zeros(shape, self.dtype) for port, shape in function.inputs.items()}
-            found = function(**given, threads=self.threads)
+            # what it takes beside them are accelerations, on which these results do not depend, or which are zero
+            at_rest = {"qdd": np.zeros(self.coordinates.nv, self.dtype)}
+            given = {**at_rest, **inputs}
+            found = function(**{port: given[port] for port in function.inputs}, threads=self.threads)
             return dict(zip(function.outputs, [found] if len(function.outputs) == 1 else found))
 
         return call, function.outputs
@@ -211,12 +212,7 @@ class FunctionMap(Map):
     # -- derivatives along tangents: a function of inputs, and its results by (output, input)
 
     def _along_tangents(self):
-        if self.robot._loaded.is_by_columns:
-            raise NotDifferentiable("derivatives take matrices by rows: leave `matrices` out of the scene's [outputs]")
-        if not self.coordinates.are_known:
-            raise NotDifferentiable(
-                f"`{self.name}` is not differentiated of a robot with closed loops, whose configurations have dependent coordinates"
-            )
+        self._refuse_scenes()
         if self.name in BY_MATRICES:
             return self._by_matrices(*BY_MATRICES[self.name])
         if self.name in BY_RATES:
@@ -226,6 +222,15 @@ class FunctionMap(Map):
         if self.name == "forward_kinematics":
             return self._by_jacobian()
         raise NotDifferentiable(self.refusal)
+
+    def _refuse_scenes(self):
+        scene = self.robot._loaded.undifferentiable
+        if scene:
+            raise NotDifferentiable(f"`{self.name}` is not differentiated in a scene with {scene}")
+        if not self.coordinates.are_known:
+            raise NotDifferentiable(
+                f"`{self.name}` is not differentiated of a robot with closed loops, whose configurations have dependent coordinates"
+            )
 
     def _by_matrices(self, name, results):
         function, outputs = self._other(name)
@@ -241,7 +246,9 @@ class FunctionMap(Map):
         axes = len(self.outputs[output])
 
         def call(inputs):
-            rates = function({"q": inputs["q"][..., None, :], "qd": units})[rate]
+            # of each state as many as there are velocities
+            spread = {port: np.expand_dims(inputs[port], -1 - len(shape)) for port, shape in self.inputs.items()}
+            rates = function({**spread, "qd": units})[rate]
             return {(output, "q"): np.moveaxis(rates, -1 - axes, -1)}
 
         return call, [(output, "q")]
@@ -327,8 +334,13 @@ class FunctionMap(Map):
 
     def pullback(self):
         name = f"{self.name}_vjp"
-        if self.name in BY_PRODUCTS and name in self.robot.functions and self.coordinates.are_known:
-            return ProductMap(self)
+        if self.name in BY_PRODUCTS and name in self.robot.functions:
+            self._refuse_scenes()
+            (shape,) = self.outputs.values()
+            product = getattr(self.robot, name)
+            # a scene can leave parts of either out
+            if product.inputs == {**self.inputs, "multiplier": shape}:
+                return ProductMap(self, product)
         matrices = self.matrices()
         pairs = list(matrices.outputs)
         names = [name for name in self.inputs if any(pair[1] == name for pair in pairs)]
@@ -345,25 +357,29 @@ class FunctionMap(Map):
 class ProductMap(Map):
     """Multipliers times the derivatives of inverse or forward dynamics, by functions that do not form matrices."""
 
-    def __init__(self, whole):
-        self.whole, self.product = whole, getattr(whole.robot, f"{whole.name}_vjp")
-        outputs = {name.removeprefix("vjp_"): whole.inputs[name.removeprefix("vjp_")] for name in self.product.outputs}
-        super().__init__(self.product.__name__, self.product.inputs, outputs, whole.dtype, self._call)
+    def __init__(self, whole, product):
+        self.whole, self.product = whole, product
+        names = [name.removeprefix("vjp_") for name in product.outputs]
+        inputs = {**whole.inputs, "multiplier": product.inputs["multiplier"]}
+        super().__init__(product.__name__, inputs, {name: whole.inputs[name] for name in names}, whole.dtype, self._call)
 
     def _call(self, *inputs):
-        found = self.product(*inputs, threads=self.whole.threads)
+        inputs = dict(zip(self.inputs, inputs))
+        found = self.product(**inputs, threads=self.whole.threads)
         found = dict(zip(self.outputs, [found] if len(self.outputs) == 1 else found))
         if "q" in found and not self.whole.coordinates.are_flat:
-            q = dict(zip(self.inputs, inputs))["q"]
-            found["q"] = (found["q"][..., None, :] @ self.whole.coordinates.back(q))[..., 0, :]
+            found["q"] = (found["q"][..., None, :] @ self.whole.coordinates.back(inputs["q"]))[..., 0, :]
         return list(found.values())
 
     def pullback(self):
         """Of gᵀ ∂(λ·y)/∂x: the Hessian of λ·y times g, and ∂y/∂x g by λ."""
-        whole, robot = self.whole, self.whole.robot
+        whole = self.whole
         if not whole.coordinates.are_flat:
             raise NotDifferentiable(f"second derivatives of `{whole.name}` are not known by the coordinates of quaternions")
-        second, along = whole._other(f"{whole.name}_hvp")[0], whole._other(f"{whole.name}_jvp")[0]
+        second, given = whole._other(f"{whole.name}_hvp")
+        along, _ = whole._other(f"{whole.name}_jvp")
+        if not {f"hvp_{name}" for name in self.outputs} <= set(given):
+            raise NotDifferentiable(f"second derivatives of `{whole.name}` take all results of `{whole.name}_hvp`")
 
         def call(*values):
             inputs = dict(zip(self.inputs, values))

@@ -53,13 +53,27 @@ fn the_package_does_what_its_tests_say() {
     let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join(format!("python-{}", std::process::id()));
     package(&folder);
     let tests = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests");
-    let mut command = Command::new(python);
-    command.args(["-B", "-m", "unittest", "discover", "--verbose", "--start-directory"]).arg(&tests);
-    // nothing of what an earlier build has kept
-    let command = command.env("PYTHONPATH", &folder).env("XDG_CACHE_HOME", folder.join("cache")).current_dir(&folder);
-    let output = command.output().expect("Python starts");
-    let said = String::from_utf8_lossy(&output.stderr);
-    said.lines().filter(|line| line.contains("skipped")).for_each(|line| println!("{line}"));
+    let files = fs::read_dir(&tests).expect("the tests are there").map(|entry| entry.expect("the folder can be read"));
+    let mut files: Vec<String> = files.map(|entry| entry.file_name().to_string_lossy().into_owned()).collect();
+    files.retain(|name| name.starts_with("test_") && name.ends_with(".py"));
+    files.sort();
+    let mut failed = String::new();
+    // each in a process of its own: where JAX has threads, processes should not be forked
+    for file in &files {
+        let mut command = Command::new(&python);
+        command
+            .args(["-B", "-m", "unittest", "discover", "--verbose", "--pattern", file, "--start-directory"])
+            .arg(&tests);
+        // nothing of what an earlier build has kept
+        command.env("PYTHONPATH", &folder).env("XDG_CACHE_HOME", folder.join("cache")).current_dir(&folder);
+        let output = command.output().expect("Python starts");
+        let said = String::from_utf8_lossy(&output.stderr);
+        said.lines().filter(|line| line.contains("skipped")).for_each(|line| println!("{line}"));
+        if !output.status.success() {
+            failed += &format!("{file}\n{}\n{said}\n", String::from_utf8_lossy(&output.stdout));
+        }
+    }
+    assert!(!files.is_empty(), "no tests are in {}", tests.display());
     let _ = fs::remove_dir_all(&folder);
-    assert!(output.status.success(), "{}\n{said}", String::from_utf8_lossy(&output.stdout));
+    assert!(failed.is_empty(), "{failed}");
 }
