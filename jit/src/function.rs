@@ -73,6 +73,13 @@ impl fmt::Display for CallError {
 impl std::error::Error for CallError {}
 
 impl<T: Number> LoadedFunction<T> {
+    /// Of a program, as fast as this machine can execute it, with products and sums in one rounding where they are `fused`; none of a program
+    /// that only texts have: in mixed precision, or with short sines.
+    pub fn of_program(program: &TracedProgram, fused: bool) -> Option<LoadedFunction<T>> {
+        let is_plain = program.graph.formats.is_empty() && program.graph.sines == Sines::Precise;
+        is_plain.then(|| LoadedFunction::new(program, fused, ExecutionMode::best()))
+    }
+
     pub(crate) fn new(program: &TracedProgram, fused: bool, execution: ExecutionMode) -> LoadedFunction<T> {
         LoadedFunction::of(program.function.name(), (&program.graph, &program.schedule), fused, execution)
     }
@@ -138,6 +145,23 @@ impl<T: Number> LoadedFunction<T> {
     /// If arrays are missing, or have not the lengths of the [inputs](Self::inputs) and [outputs](Self::outputs).
     pub fn call(&self, inputs: &[&[T]], results: &mut [&mut [T]]) -> Result<(), CallError> {
         self.runner().call(inputs, results)
+    }
+
+    /// For one state: all results, one behind the other, in memory of their own.
+    ///
+    /// # Errors
+    /// As [`call`](Self::call).
+    pub fn results(&self, inputs: &[&[T]]) -> Result<Vec<T>, CallError> {
+        let mut found = vec![T::default(); self.outputs.iter().map(Port::len).sum()];
+        let mut rest = &mut found[..];
+        let mut results = Vec::with_capacity(self.outputs.len());
+        for port in &self.outputs {
+            let (own, others) = rest.split_at_mut(port.len());
+            results.push(own);
+            rest = others;
+        }
+        self.call(inputs, &mut results)?;
+        Ok(found)
     }
 
     /// What calls it without asking for memory.

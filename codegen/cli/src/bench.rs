@@ -117,16 +117,15 @@ fn loaded<T: Number>(source: &Source, options: &Options) -> Result<(Robot<T>, Lo
             })?;
         Ok::<_, CommandFailure>((robot, start.elapsed().as_secs_f64() * 1e3))
     };
-    let (robot, made) = load(&NoStore)?;
-    let kept = match (options.optimise, tempfile::tempdir()) {
+    match (options.optimise, tempfile::tempdir()) {
+        // the first start keeps what the second one finds
         (OptimisationTier::Full, Ok(folder)) => {
             let folder = ProgramFolder::new(folder.path());
-            load(&folder)?;
-            Some(load(&folder)?.1)
+            let (robot, made) = load(&folder)?;
+            Ok((robot, (made, Some(load(&folder)?.1))))
         }
-        _ => None,
-    };
-    Ok((robot, (made, kept)))
+        _ => load(&NoStore).map(|(robot, made)| (robot, (made, None))),
+    }
 }
 
 fn measured<T: Number>(

@@ -15,6 +15,7 @@ mod files;
 #[cfg(feature = "simulation")]
 mod gains;
 mod given;
+mod machine_code;
 #[cfg_attr(not(feature = "simulation"), path = "without_simulation.rs")]
 mod motion;
 #[cfg(feature = "simulation")]
@@ -42,7 +43,7 @@ use straightline_codegen::emit::package::PACKAGES;
 use straightline_codegen::emit::rust::c_package::C_ABI;
 use straightline_codegen::emit::Generated;
 use straightline_codegen::options::{check_options, scene_file, Options, SceneFile};
-use straightline_codegen::verify::{self, Verification};
+use straightline_codegen::verify::{verify_by, Verification};
 use straightline_codegen::{description, identifier, model, output, scene};
 
 /// Why a command ended early; what there is to say was said where it happened, except for [`CommandFailure::Files`].
@@ -190,7 +191,7 @@ fn check(a: &CheckArguments) -> Result<(), CommandFailure> {
     }
 }
 
-/// Compares the programs of a robot with the second author in so many states from this seed.
+/// Compares the programs of a robot, run by machine code, with the second author in so many states from this seed.
 fn verified(
     robot: &Path,
     (generated, options): &(Generated, Options),
@@ -198,7 +199,10 @@ fn verified(
 ) -> Result<Verification, CommandFailure> {
     let source = read(robot)?;
     let progress = print::bar("verifying", states.into());
-    let verified = verify::verify(&source, generated, options, (states, seed), || progress.inc(1));
+    let robot = (&generated.model, &generated.frames[..]);
+    let tick = || progress.inc(1);
+    let verified =
+        verify_by(&source, robot, options, (states, seed), &|program| machine_code::run(program, options), tick);
     progress.finish_and_clear();
     verified.map_err(|what| print::failure(format!("{}: {what}", source.path())))
 }

@@ -1,6 +1,6 @@
 //! The program against the second author, on random states.
 //!
-//! The program is run operation by operation in its own arithmetic, as rustc compiles it. The truth is the handbook
+//! The program is run operation by operation in its own arithmetic, as rustc compiles it, or by whatever else runs programs ([`verify_by`]). The truth is the handbook
 //! chapter's formulation in double-double, from a second reading of the same robot file: it shares with the program the
 //! parsed file and nothing else.
 //!
@@ -23,7 +23,6 @@ use straightline_core::random::Random;
 use straightline_core::reference::CentreOfMassTree;
 use straightline_core::{trig, Dd};
 use straightline_graph::expr::{evaluate, Graph, Port};
-use straightline_graph::schedule::Schedule;
 use straightline_graph::{element_of, Scalar};
 
 mod loops;
@@ -102,6 +101,9 @@ pub fn bound(scalar: Scalar) -> f64 {
     2048.0 * scalar.unit()
 }
 
+/// What gives the results of a program, one after the other, for the numbers that it takes, one after the other.
+pub type ProgramRun<'p> = Box<dyn Fn(&[f64]) -> Vec<f64> + 'p>;
+
 /// Compares the programs of a robot with the reference, which reads `source` on its own. `tick` is called after every
 /// state.
 ///
@@ -112,9 +114,24 @@ pub fn verify(
     generated: &Generated,
     options: &Options,
     (states, seed): (u32, u64),
+    tick: impl FnMut(),
+) -> Result<Verification, String> {
+    let robot = (&generated.model, &generated.frames[..]);
+    verify_by(source, robot, options, (states, seed), &|program| interpreted(program, options), tick)
+}
+
+/// The same of a robot in its scene with its frames, where something else runs its programs.
+///
+/// # Errors
+/// As [`verify`].
+pub fn verify_by(
+    source: &Source,
+    (model, frames): (&Model<Dd>, &[String]),
+    options: &Options,
+    (states, seed): (u32, u64),
+    runner: &dyn for<'p> Fn(&'p TracedProgram) -> ProgramRun<'p>,
     mut tick: impl FnMut(),
 ) -> Result<Verification, String> {
-    let (model, frames) = (&generated.model, &generated.frames);
     let options = &options.knowing(source);
     let scene = &options.scene.resolved(model);
     let options = &Options { scene: scene.clone(), model: scene.model_options(&options.model), ..options.clone() };
@@ -134,10 +151,12 @@ pub fn verify(
         }
     }
     let mut worst: BTreeMap<&'static str, Worst> = BTreeMap::new();
+    let runs: Vec<ProgramRun<'_>> = programs.iter().map(runner).collect();
     for state in 0..states {
         let at = case.at(state % 2 == 1, &mut random)?;
-        for TracedProgram { function, graph, schedule, .. } in &programs {
-            let values = run((graph, schedule), &at.inputs, options);
+        for (TracedProgram { function, graph, .. }, run) in programs.iter().zip(&runs) {
+            let given: Vec<f64> = graph.inputs.iter().flat_map(|port| &at.inputs[&port.name]).copied().collect();
+            let values = run(&given);
             let truth = at.truth(&case, *function)?.expect("whether there is a truth does not depend on the state");
             assert_eq!(values.len(), truth.len(), "{}", function.name());
             let errors = values.iter().zip(&truth).map(|(v, (e, s))| scaled(*v, *e, *s)).enumerate();
@@ -284,24 +303,23 @@ fn scaled(value: f64, expected: Dd, scale: f64) -> f64 {
     }
 }
 
-/// The program's outputs in its own arithmetic; of one that fuses, as on a machine with the instruction.
-fn run((graph, schedule): (&Graph, &Schedule), inputs: &InputState<f64>, options: &Options) -> Vec<f64> {
-    let inputs = graph.inputs.iter().flat_map(|port| &inputs[&port.name]).copied();
-    let program = (graph, schedule);
+/// A program in its own arithmetic, operation by operation; one that fuses, as on a machine with the instruction.
+pub fn interpreted<'p>(program: &'p TracedProgram, options: &Options) -> ProgramRun<'p> {
+    let TracedProgram { graph, schedule, .. } = program;
     match (options.scalar, options.fma) {
-        (Scalar::F64, false) => evaluate::<f64>(graph, &inputs.collect::<Vec<_>>()),
-        (Scalar::F64, true) => {
+        (Scalar::F64, false) => Box::new(|inputs| evaluate::<f64>(graph, inputs)),
+        (Scalar::F64, true) => Box::new(|inputs| {
             let sin_cos = |x| trig::sin_cos_of_sum_fused_f64(x, f64::mul_add);
-            fused::evaluate(program, &inputs.collect::<Vec<_>>(), f64::mul_add, sin_cos)
-        }
-        (Scalar::F32, fma) => {
-            let inputs: Vec<f32> = inputs.map(|x| x as f32).collect();
+            fused::evaluate((graph, schedule), inputs, f64::mul_add, sin_cos)
+        }),
+        (Scalar::F32, fma) => Box::new(move |inputs| {
+            let inputs: Vec<f32> = inputs.iter().map(|x| *x as f32).collect();
             let sin_cos = |x| trig::sin_cos_of_sum_fused_f32(x, f32::mul_add);
             let results = match fma {
                 false => evaluate(graph, &inputs),
-                true => fused::evaluate(program, &inputs, f32::mul_add, sin_cos),
+                true => fused::evaluate((graph, schedule), &inputs, f32::mul_add, sin_cos),
             };
             results.into_iter().map(f64::from).collect()
-        }
+        }),
     }
 }

@@ -26,6 +26,9 @@ pub struct Design {
     gradient: LoadedFunction<f64>,
 }
 
+/// What is said of arrays whose lengths are those of the robot.
+const FITTING: &str = "arrays are as long as the robot has joints and parameters";
+
 /// What of the robot follows a parameter.
 enum DesignChange {
     /// The link's share of each body, at the value `whole`.
@@ -78,26 +81,19 @@ impl Design {
 
     /// Joint torques or forces tau \[N·m or N\] of a motion for these values of the parameters.
     pub fn torques(&self, q: &[f64], qd: &[f64], qdd: &[f64], p: &[f64]) -> Vec<f64> {
-        results(&self.torques, &[q, qd, qdd, p])
+        self.torques.results(&[q, qd, qdd, p]).expect(FITTING)
     }
 
     /// What every joint exerts on its link, force \[N\] and moment \[N·m\], in the order of the velocity coordinates.
     pub fn wrenches(&self, q: &[f64], qd: &[f64], qdd: &[f64], p: &[f64]) -> Vec<[f64; 6]> {
-        let flat = results(&self.wrenches, &[q, qd, qdd, p]);
+        let flat = self.wrenches.results(&[q, qd, qdd, p]).expect(FITTING);
         flat.chunks(6).map(|w| std::array::from_fn(|k| w[k])).collect()
     }
 
     /// λᵀ ∂tau/∂p.
     pub fn gradient(&self, q: &[f64], qd: &[f64], qdd: &[f64], p: &[f64], seed: &[f64]) -> Vec<f64> {
-        results(&self.gradient, &[q, qd, qdd, p, seed])
+        self.gradient.results(&[q, qd, qdd, p, seed]).expect(FITTING)
     }
-}
-
-/// The only result of a function.
-fn results(function: &LoadedFunction<f64>, inputs: &[&[f64]]) -> Vec<f64> {
-    let mut found = vec![0.0; function.outputs()[0].len()];
-    function.call(inputs, &mut [&mut found]).expect("arrays are as long as the robot has joints and parameters");
-    found
 }
 
 fn change(

@@ -54,10 +54,7 @@ impl CompiledEquations {
         (function, made): (Function, &OnceLock<Option<LoadedFunction<f64>>>),
         inputs: &[&[f64]],
     ) -> Option<Vec<f64>> {
-        let made = made.get_or_init(|| self.made(function)).as_ref()?;
-        let mut found = vec![0.0; made.outputs()[0].len()];
-        made.call(inputs, &mut [&mut found]).ok()?;
-        Some(found)
+        made.get_or_init(|| self.made(function)).as_ref()?.results(inputs).ok()
     }
 }
 
