@@ -30,7 +30,7 @@ macro_rules! operators {
 macro_rules! numbers {
     (($d:tt) $($(#[$doc:meta])* $Name:ident($type:ty) {
         name: $name:literal, description: $description:literal, module: $module:literal, c_name: $c_name:literal,
-        c_suffix: $c_suffix:literal,
+        c_suffix: $c_suffix:literal, ptx_prefix: $ptx_prefix:literal,
         wider: $wider:expr, trig_ulps: $trig_ulps:literal, trig_domain: $trig_domain:expr, short_sines: $short:expr, ridge: $ridge:literal,
         code_bytes: $code_bytes:expr $(,)?
     })+) => {
@@ -47,6 +47,7 @@ macro_rules! numbers {
             module: $module,
             c_name: $c_name,
             c_suffix: $c_suffix,
+            ptx_prefix: $ptx_prefix,
             bytes: size_of::<$type>(),
             significand: <$type>::MANTISSA_DIGITS,
             epsilon: <$type>::EPSILON as f64,
@@ -62,6 +63,7 @@ macro_rules! numbers {
             rounded: |x| (x as $type).into(),
             next: |x| (x as $type).next_up().into(),
             literal: |x| format!("{:?}", x as $type),
+            bits: |x| u64::from((x as $type).to_bits()),
             read: |text| text.parse::<$type>().ok().map(f64::from),
         }),+];
 
@@ -186,12 +188,12 @@ macro_rules! numbers {
 numbers! { ($)
     /// Double precision.
     F64(f64) {
-        name: "f64", description: "double precision", module: "double", c_name: "double", c_suffix: "", wider: None,
+        name: "f64", description: "double precision", module: "double", c_name: "double", c_suffix: "", ptx_prefix: "0d", wider: None,
         trig_ulps: 0.797, trig_domain: trig::DOMAIN_F64, short_sines: None, ridge: 1e-12, code_bytes: [11.3, 398.0, 551.0],
     }
     /// Single precision.
     F32(f32) {
-        name: "f32", description: "single precision", module: "single", c_name: "float", c_suffix: "F",
+        name: "f32", description: "single precision", module: "single", c_name: "float", c_suffix: "F", ptx_prefix: "0f",
         wider: Some(Scalar::F64),
         // 0.801, and the 2^-32 more of sums of far angles
         trig_ulps: 0.806, trig_domain: trig::DOMAIN_F32,
@@ -209,6 +211,7 @@ macro_rules! columns {
             rounded: fn(f64) -> f64,
             next: fn(f64) -> f64,
             literal: fn(f64) -> String,
+            bits: fn(f64) -> u64,
             read: fn(&str) -> Option<f64>,
         }
 
@@ -232,6 +235,8 @@ columns! {
     c_name: &'static str,
     /// What stands behind a constant of it in C.
     c_suffix: &'static str,
+    /// What stands before the bits of a constant of it in PTX.
+    ptx_prefix: &'static str,
     /// So many bytes one takes.
     bytes: usize,
     /// So many bits a significand has.
@@ -289,6 +294,11 @@ impl Scalar {
     /// The shortest literal that reads back to the nearest number, which is finite.
     pub fn literal(self, x: f64) -> String {
         (self.row().literal)(x)
+    }
+
+    /// The bits of a number of it.
+    pub fn bits(self, x: f64) -> u64 {
+        (self.row().bits)(x)
     }
 
     /// The number that a literal stands for; none of what is no literal.

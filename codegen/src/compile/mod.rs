@@ -9,7 +9,6 @@ pub use prepare::examine;
 use crate::description::{messages, Description};
 use crate::diagnostic::fnv_1a;
 use crate::diagnostic::{Diagnostic, Diagnostics, Source};
-use crate::emit::c99::C99_SOURCE;
 use crate::emit::generated::generate;
 use crate::emit::package::PackageKind;
 use crate::emit::Generated;
@@ -23,7 +22,6 @@ use crate::program::staged::figures;
 use crate::program::stored::{NoStore, ProgramStore};
 use crate::program::written::WrittenFunction;
 use crate::program::{range, TracedProgram};
-use crate::readback::c99::CReader;
 use crate::report::budget::{self, Measures};
 use crate::report::certificates::certificates;
 use crate::report::waterfall;
@@ -31,6 +29,7 @@ use crate::{readback, scene};
 use figures::{with_figures, Compilation};
 use prepare::{prepare, Prepared};
 use programs::Stored;
+use std::sync::OnceLock;
 use straightline_core::model::Model;
 use straightline_core::Dd;
 use straightline_graph::Scalar;
@@ -60,8 +59,7 @@ pub fn explain(source: &Source, options: &Options) -> Result<Generated, Diagnost
     Ok(generated)
 }
 
-/// The files of a package, whose names in other languages begin with the prefix: C99 is read back as every text is; of others the text is
-/// that of [`Generated::text`], which was.
+/// The files of a package, whose names in other languages begin with the prefix, read back as every text is.
 ///
 /// # Errors
 /// That the package is not what was compiled, which is an error of ours.
@@ -71,10 +69,8 @@ pub fn checked_package(
     prefix: &str,
 ) -> Result<Vec<(String, String)>, Diagnostics> {
     let files = (kind.files)(generated, prefix);
-    if kind.name == C99_SOURCE.name {
-        let read = CReader::new(generated, prefix).check(&files);
-        read.map_err(|mismatch| only(readback::complaint(&mismatch)))?;
-    }
+    let read = readback::packages::check(kind.name, generated, prefix, &files);
+    read.map_err(|mismatch| only(readback::complaint(&mismatch)))?;
     Ok(files)
 }
 
@@ -107,9 +103,13 @@ fn compiling(source: &Source, options: &Options, store: &dyn ProgramStore) -> Re
     let robot = Robot::new(model).knowing_base_parameters(&resolved.functions, &resolved.scene);
     let is_empty = |f: &Function| f.is_per_frame() && resolved.scene.frames_of(*f, &frames).is_empty();
     let functions: Vec<Function> = resolved.functions.iter().copied().filter(|f| !is_empty(f)).collect();
-    let hash_of = |options: &Options| hash(source.text(), &diagnostics, options);
-    let key = |function| hash_of(&Options { functions: vec![function], ..resolved.clone() });
-    let hash = hash_of(&resolved);
+    let hash = hash(source.text(), &diagnostics, &resolved);
+    let of_robot = OnceLock::new();
+    let key = |function| {
+        let of_robot = of_robot.get_or_init(|| self::hash(source.text(), &diagnostics, &Options::default()));
+        let options = Options { functions: vec![function], ..resolved.clone() };
+        fnv_1a(of_robot.to_le_bytes().into_iter().chain(options.hashed().bytes()))
+    };
     let stored = Stored { store, key: &key };
     let programs = programs::programs(&robot, &frames, &functions, &resolved, &stored);
     let mut programs = programs.map_err(|wrong| only(no_form(&wrong, &robot.model, options.scalar, &description)))?;

@@ -29,7 +29,7 @@ use std::collections::BTreeMap;
 use straightline_core::model::Model;
 use straightline_core::Dd;
 use straightline_graph::expr::{Graph, Section};
-use straightline_graph::schedule::Schedule;
+use straightline_graph::schedule::{Schedule, ScheduleLimits};
 use straightline_graph::{certify, Scalar};
 
 /// Where a file came from, for its header.
@@ -74,6 +74,8 @@ pub struct Generated {
     pub plain_style: Style,
     /// Whether functions over lanes and batches stand beside the plain ones.
     pub lanes: Option<Lanes>,
+    /// How long the parts of its functions may be.
+    pub limits: ScheduleLimits,
     /// The machine that it is made for.
     pub target: Option<TargetMachine>,
     /// The memory that it runs from there.
@@ -279,6 +281,7 @@ pub(crate) fn generate(
         style: options.style(),
         plain_style: options.plain_style(),
         lanes: options.lanes,
+        limits: options.limits,
         target: options.target,
         memory: options.memory,
         rustc: None,

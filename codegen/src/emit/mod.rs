@@ -8,6 +8,7 @@ mod contact;
 mod doc;
 mod error_bound;
 pub mod generated;
+pub mod gpu;
 pub mod lower;
 pub mod module;
 pub mod package;

@@ -1,6 +1,8 @@
-//! Packages of generated code for who does not write Rust: a row each.
+//! Packages of generated code for who does not write Rust: a row each. What reads one back is a row of `readback::packages`.
 
+use super::c99::opencl::OPENCL;
 use super::c99::C99_SOURCE;
+use super::gpu::ptx::PTX;
 use super::rust::c_package::C_ABI;
 use super::Generated;
 
@@ -17,7 +19,7 @@ pub struct PackageKind {
     pub files: fn(&Generated, &str) -> Vec<(String, String)>,
 }
 
-/// Why there is no package of C of what Rust alone has.
+/// Why there is no package of what Rust alone has.
 pub(super) fn rust_alone(generated: &Generated) -> Option<[&'static str; 2]> {
     match () {
         () if generated.plain_style.generic => Some(NO_GENERIC),
@@ -30,10 +32,10 @@ pub(super) fn rust_alone(generated: &Generated) -> Option<[&'static str; 2]> {
 }
 
 const NO_GENERIC: [&str; 2] =
-    ["C has no generic functions", "leave out `generic`; `scalar` says which numbers the C functions take"];
+    ["packages have no generic functions", "leave out `generic`; `scalar` says which numbers their functions take"];
 
 const ONE_SCALAR: [&str; 2] = [
-    "a C package has one scalar type, and no stages: C could not tell a stage that is out of date",
+    "a package has one scalar type, and no stages: other languages could not tell a stage that is out of date",
     "say which with `--scalar`, and leave `staged` out of the scene",
 ];
 
@@ -46,7 +48,7 @@ const NO_FIGURES: [&str; 2] = [
 ];
 
 const NO_SELF_TEST: [&str; 2] =
-    ["a package of C has no self-test", "leave out `self_test`; a file of Rust has it (`straightline generate`)"];
+    ["a package has no self-test", "leave out `self_test`; a file of Rust has it (`straightline generate`)"];
 
 /// All kinds.
-pub static PACKAGES: &[PackageKind] = &[C_ABI, C99_SOURCE];
+pub static PACKAGES: &[PackageKind] = &[C_ABI, C99_SOURCE, OPENCL, PTX];

@@ -59,6 +59,12 @@ pub struct TracedProgram {
 }
 
 impl TracedProgram {
+    /// A graph in the order in which it is written.
+    fn scheduled(function: Function, graph: Graph, options: &Options) -> TracedProgram {
+        let schedule = schedule(&graph, options.limits, options.schedule_machine().as_ref());
+        TracedProgram { function, graph, schedule, method: None, plainer: None, entries: Vec::new() }
+    }
+
     /// Whether its constants are those of the robot, in double-double: otherwise no bound of its errors is one of the robot.
     pub(crate) fn has_folded_constants(&self, options: &Options) -> bool {
         options.optimisations().folding && self.plainer.as_ref().is_none_or(|plainer| plainer.without != FOLDING)
@@ -89,8 +95,7 @@ pub fn checked(
         let made = (sines::with_sines(graph, function, &robot.model, options), method);
         equivalence::of_function(robot, frames, function, options, optimisations, &made.0).map(|()| made)
     })?;
-    let schedule = schedule(&graph, options.limits, options.schedule_machine().as_ref());
-    Ok(TracedProgram { function, graph, schedule, method, plainer, entries: Vec::new() })
+    Ok(TracedProgram { method, plainer, ..TracedProgram::scheduled(function, graph, options) })
 }
 
 /// The operations of one function of a robot, with these optimisations only.

@@ -6,13 +6,17 @@ use crate::function::Function;
 use crate::options::Options;
 use crate::program::{equivalence, TracedProgram};
 use straightline_graph::expr::{verify, Graph, Sines};
-use straightline_graph::schedule::schedule;
 
 /// Keeps the graphs of programs, such as on a disk, for who compiles the same robot again.
 ///
 /// What it finds is trusted in nothing: it is taken only if it keeps what graphs promise, has the inputs and results of the function, and
 /// agrees with the plain equations of the robot, in double-double and in its own scalar.
 pub trait ProgramStore: Sync {
+    /// Whether it ever has anything: otherwise no key is made.
+    fn keeps(&self) -> bool {
+        true
+    }
+
     /// The graph that was kept by that key.
     fn find(&self, key: u64) -> Option<Graph>;
 
@@ -25,6 +29,10 @@ pub trait ProgramStore: Sync {
 pub struct NoStore;
 
 impl ProgramStore for NoStore {
+    fn keeps(&self) -> bool {
+        false
+    }
+
     fn find(&self, _: u64) -> Option<Graph> {
         None
     }
@@ -52,6 +60,5 @@ pub(crate) fn accepted(
         return None;
     }
     equivalence::of_function(robot, frames, function, options, options.optimisations(), &graph).ok()?;
-    let schedule = schedule(&graph, options.limits, options.schedule_machine().as_ref());
-    Some(TracedProgram { function, graph, schedule, method: None, plainer: None, entries: Vec::new() })
+    Some(TracedProgram::scheduled(function, graph, options))
 }

@@ -13,9 +13,12 @@ mod around;
 pub mod c99;
 mod fixed;
 mod items;
+pub mod packages;
+mod ptx;
 mod run;
 mod tokens;
 mod values;
+mod wanted;
 
 use crate::diagnostic::{Diagnostic, Diagnostics};
 use crate::emit::Generated;

@@ -75,7 +75,7 @@ fn options_of(scene: &str, options: Options) -> Options {
     file.unwrap_or_else(|| panic!("{diagnostics}")).into_options(options)
 }
 
-fn robot(name: &str) -> Source {
+pub fn robot(name: &str) -> Source {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../robots/descriptions").join(name);
     Source::new(name, std::fs::read_to_string(&path).unwrap_or_else(|e| panic!("{}: {e}", path.display())))
 }
@@ -158,14 +158,14 @@ impl Package {
 }
 
 /// A number that a program computes, with what it is.
-struct True {
+pub struct True {
     what: String,
-    value: f64,
+    pub value: f64,
     scalar: Scalar,
 }
 
 /// What computed bytes have else than they should; that a number is none is all that is asked of one that is none.
-fn differences(computed: &[u8], truth: &[True]) -> Vec<String> {
+pub fn differences(computed: &[u8], truth: &[True]) -> Vec<String> {
     let mut at = 0;
     let mut found = Vec::new();
     for True { what, value, scalar } in truth {
@@ -184,7 +184,7 @@ fn differences(computed: &[u8], truth: &[True]) -> Vec<String> {
 }
 
 /// The inputs of states for all functions as bytes, and what the interpreter makes of them.
-fn numbers(programs: &[(String, &Graph, Scalar)], states: usize) -> (Vec<u8>, Vec<True>) {
+pub fn numbers(programs: &[(String, &Graph, Scalar)], states: usize) -> (Vec<u8>, Vec<True>) {
     let mut random = Random(7);
     let (mut given, mut truth) = (Vec::new(), Vec::new());
     for (name, graph, scalar) in programs {

@@ -3,6 +3,7 @@
 use crate::written::{Shape, Style, Written};
 use std::ops::Range;
 use std::path::Path;
+use std::sync::LazyLock;
 use straightline_codegen::certify::Effort;
 use straightline_codegen::choices::{LimbForm, TargetMachine};
 use straightline_codegen::compile::checked_package;
@@ -41,7 +42,12 @@ fn generated(robot: &Source, options: &Options) -> Generated {
 }
 
 /// Packages of every kind of text: parts, loops over limbs, sums of angles, parameters of bodies and drives, contacts, bounds, mixed precision.
-fn kinds() -> Vec<(&'static str, Generated)> {
+pub fn kinds() -> &'static [(&'static str, Generated)] {
+    static KINDS: LazyLock<Vec<(&'static str, Generated)>> = LazyLock::new(every_kind);
+    &KINDS
+}
+
+fn every_kind() -> Vec<(&'static str, Generated)> {
     let of = |functions: &[Function]| Options { functions: functions.to_vec(), ..Options::default() };
     let arm = Source::new("arm.toml", ARM);
     let scene = Source::new("scene.toml", SCENE);
@@ -96,7 +102,7 @@ fn packages_of_robots_as_people_write_them_are_read_back() {
 }
 
 /// The words of a text, comments aside.
-fn words(text: &str) -> Vec<Range<usize>> {
+pub fn words(text: &str) -> Vec<Range<usize>> {
     let bytes = text.as_bytes();
     let is_word = |b: u8| b.is_ascii_alphanumeric() || b == b'_';
     let mut words = Vec::new();
@@ -129,7 +135,7 @@ fn words(text: &str) -> Vec<Range<usize>> {
 }
 
 /// A text with one word changed: into another of its kind, into none, or with its neighbour.
-fn changed(text: &str, words: &[Range<usize>], random: &mut Random) -> Option<(String, String)> {
+pub fn changed(text: &str, words: &[Range<usize>], random: &mut Random) -> Option<(String, String)> {
     let k = random.below(words.len() - 1);
     let (range, next) = (words[k].clone(), words[k + 1].clone());
     let word = &text[range.clone()];
@@ -163,7 +169,7 @@ fn changed(text: &str, words: &[Range<usize>], random: &mut Random) -> Option<(S
 }
 
 /// Whether a change is none: of the order of operands, of what nothing is done with, of a leading or trailing zero, of a space.
-fn is_none(before: &str, after: &str) -> bool {
+pub fn is_none(before: &str, after: &str) -> bool {
     let differing: Vec<(&str, &str)> = before.lines().zip(after.lines()).filter(|(a, b)| a != b).collect();
     let [(a, b)] = differing.as_slice() else { return false };
     let squeezed = |line: &str| line.split_whitespace().collect::<Vec<_>>().concat();

@@ -4,6 +4,7 @@ mod cpp;
 mod header;
 pub mod interface;
 mod kernel;
+pub mod opencl;
 mod parameter;
 mod readme;
 mod routine;

@@ -1,7 +1,7 @@
 //! What makes run-time parameters in C, checked: the ten inertial parameters of a body, numbers of a drive.
 
 use super::interface::Interface;
-use super::routine::{c_number, C99};
+use super::routine::{c_number, C99, STATIC};
 use crate::description::drives::DriveNumber;
 use crate::emit::lower::Names;
 use crate::emit::module::{ParameterOf, ParameterType};
@@ -11,7 +11,7 @@ use std::fmt::Write;
 impl Interface<'_> {
     /// What makes a parameter, and its program before it.
     pub(super) fn constructor_source(&self, parameter: &ParameterType) -> String {
-        let target = C99 { prefix: self.prefix, module: String::new() };
+        let target = C99 { prefix: self.prefix, module: String::new(), table: STATIC };
         let program = target.routine(&parameter.constructor);
         let made = match &parameter.of {
             ParameterOf::Body(_) => self.body_source(parameter),

@@ -15,12 +15,17 @@ use straightline_graph::Scalar;
 /// How long a line of numbers may be.
 const LINE: usize = 110;
 
+/// The storage of arrays of constants that need no code.
+pub(super) const STATIC: &str = "static const";
+
 /// C99 that depends on nothing.
 pub struct C99<'a> {
     /// All names begin with it.
     pub prefix: &'a str,
     /// What stands between the prefix and a function's name: nothing, or its contact mode.
     pub module: String,
+    /// The storage of arrays of constants.
+    pub table: &'static str,
 }
 
 /// The types of the locals that a list of statements declares.
@@ -191,13 +196,13 @@ impl C99<'_> {
                 pairs.collect()
             }
             Statement::Array { name, values, is_constant } => {
-                let storage = if *is_constant { "static const" } else { "const" };
+                let storage = if *is_constant { self.table } else { "const" };
                 let values: Vec<String> = values.iter().map(expression).collect();
                 let start = format!("{indent}{storage} {scalar} {name}[{}] = {{", values.len());
                 wrapped(&start, &values, "};", &indent)
             }
             Statement::Table { name, rows, is_constant } => {
-                let storage = if *is_constant { "static const" } else { "const" };
+                let storage = if *is_constant { self.table } else { "const" };
                 let values: Vec<String> = rows.iter().flatten().map(expression).collect();
                 let start = format!("{indent}{storage} {scalar} {name}[{}] = {{", values.len());
                 wrapped(&start, &values, "};", &indent)

@@ -2,7 +2,7 @@
 
 use super::interface::{Exported, Interface};
 use super::kernel;
-use super::routine::{part_storage, C99};
+use super::routine::{part_storage, C99, STATIC};
 use super::{c_comment, c_string};
 use crate::emit::module::{Item, Routine};
 use crate::emit::target::Target;
@@ -61,7 +61,7 @@ const END: &str = "
 
 impl Interface<'_> {
     /// The functions of the package: those that all packages have, and the bounds of their errors.
-    pub(super) fn all_exported(&self) -> Vec<Exported> {
+    pub(in crate::emit) fn all_exported(&self) -> Vec<Exported> {
         let mut out = self.exported();
         const SUMMARY: &str = "A bound of the errors at a state.";
         let g = self.generated;
@@ -163,7 +163,7 @@ impl Interface<'_> {
     /// A function of the robot, or of a contact mode, and what bounds its errors.
     fn item_source<F>(&self, item: &Item<F>, mode: Option<&str>, summary: &str) -> String {
         let module = mode.map_or(String::new(), |mode| format!("contact_{mode}_"));
-        let target = C99 { prefix: self.prefix, module };
+        let target = C99 { prefix: self.prefix, module, table: STATIC };
         let mut out = format!("\n/* {summary} */\n{}", target.routine(&item.routine));
         match &item.bound {
             Some(Ok(bound)) => {

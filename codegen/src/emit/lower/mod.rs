@@ -120,7 +120,7 @@ fn first_read(graph: &Graph, is_read: &[bool], style: Style) -> Option<Expressio
 }
 
 /// The port that holds flat index `k`, and the index inside it.
-fn port_of(ports: &[Port], mut k: usize) -> (usize, usize) {
+pub(in crate::emit) fn port_of(ports: &[Port], mut k: usize) -> (usize, usize) {
     for (i, p) in ports.iter().enumerate() {
         if k < p.len() {
             return (i, k);

@@ -28,7 +28,7 @@ pub(super) struct CAround<'g> {
 }
 
 /// Lines with code, each with its place; code behind a comment is no line of ours, and stays as it is.
-fn code_lines(text: &str) -> Vec<(usize, &str)> {
+pub(super) fn code_lines(text: &str) -> Vec<(usize, &str)> {
     let mut found = Vec::new();
     let (mut at, mut inside) = (0, false);
     for line in text.split_inclusive('\n') {
@@ -53,6 +53,25 @@ fn code_lines(text: &str) -> Vec<(usize, &str)> {
         }
     }
     found
+}
+
+/// What the kernel defines whose lines these are.
+pub(super) fn kernel_names(lines: &[(usize, &str)], prefix: &str) -> CReading<BTreeSet<String>> {
+    let (mut names, mut at) = (BTreeSet::new(), 0);
+    let kernel = KERNEL.replace("robot_", &format!("{prefix}_"));
+    for section in kernel.split("/*== ").skip(1) {
+        let section = section.split_once('\n').map_or("", |(_, body)| body);
+        let own = code_lines(section);
+        let same = lines[at..].iter().zip(&own).all(|((_, a), (_, b))| a == b);
+        if same && lines.len() - at >= own.len() {
+            at += own.len();
+            defined(section, &mut names);
+        }
+    }
+    match lines.get(at) {
+        Some((place, _)) => Err(ReadingStop::at(*place, "a line of the kernel is not that of its source")),
+        None => Ok(names),
+    }
 }
 
 /// A function ends there.
@@ -122,21 +141,7 @@ impl<'g> CAround<'g> {
                 &["#if defined(__GNUC__)", &attribute, "#else", &format!("#define {part} static"), "#endif"],
             )?;
         }
-        let mut names = BTreeSet::new();
-        let kernel = KERNEL.replace("robot_", &format!("{}_", self.prefix));
-        for section in kernel.split("/*== ").skip(1) {
-            let section = section.split_once('\n').map_or("", |(_, body)| body);
-            let own = code_lines(section);
-            let same = lines[at..].iter().zip(&own).all(|((_, a), (_, b))| a == b);
-            if same && lines.len() - at >= own.len() {
-                at += own.len();
-                defined(section, &mut names);
-            }
-        }
-        match lines.get(at) {
-            Some((place, _)) => Err(ReadingStop::at(*place, "a line of the kernel is not that of its source")),
-            None => Ok((names, end)),
-        }
+        Ok((kernel_names(&lines[at..], &self.prefix)?, end))
     }
 
     /// The functions that are no programs.
