@@ -41,29 +41,46 @@ impl BatchLayout {
         (n == 1 || a > 0) && (m == 1 || b > 0) && (n == 1 || m == 1 || within(n, a, b) || within(m, b, a))
     }
 
-    /// Copies these entries of `lanes` states from `first` on beside one another, those of the last of all states for lanes behind it.
-    pub(crate) fn gather<T: Copy>(self, from: &[T], [first, states]: [usize; 2], lanes: usize, to: &mut [T]) {
-        for (k, block) in to.chunks_exact_mut(lanes).enumerate() {
-            let at = k * self.by_entry;
-            if self.by_state == 1 && first + lanes <= states {
-                block.copy_from_slice(&from[at + first..][..lanes]);
-                continue;
+    /// Copies the entries of `N` states from `first` on beside one another, those of the last of all states for lanes behind it.
+    #[inline]
+    pub(crate) fn gather<T: Copy, const N: usize>(self, from: &[T], [first, states]: [usize; 2], to: &mut [[T; N]]) {
+        let is_whole = first + N <= states;
+        if self.by_state == 1 && is_whole {
+            for (k, lanes) in to.iter_mut().enumerate() {
+                lanes.copy_from_slice(&from[k * self.by_entry + first..][..N]);
             }
-            for (lane, x) in block.iter_mut().enumerate() {
-                *x = from[at + (first + lane).min(states - 1) * self.by_state];
+            return;
+        }
+        if self.by_entry == 1 && is_whole {
+            let entries = to.len();
+            let rows: [&[T]; N] = std::array::from_fn(|lane| &from[(first + lane) * self.by_state..][..entries]);
+            for (k, lanes) in to.iter_mut().enumerate() {
+                *lanes = rows.map(|row| row[k]);
             }
+            return;
+        }
+        for (k, lanes) in to.iter_mut().enumerate() {
+            *lanes =
+                std::array::from_fn(|lane| from[k * self.by_entry + (first + lane).min(states - 1) * self.by_state]);
         }
     }
 
     /// Copies the lanes of entry `k` back, but those behind the last state.
-    pub(crate) fn scatter<T: Copy>(self, lanes: &[T], [first, states]: [usize; 2], k: usize, to: &mut [T]) {
-        let at = k * self.by_entry;
-        if self.by_state == 1 && first + lanes.len() <= states {
-            to[at + first..][..lanes.len()].copy_from_slice(lanes);
+    #[inline]
+    pub(crate) fn scatter<T: Copy, const N: usize>(
+        self,
+        lanes: &[T; N],
+        [first, states]: [usize; 2],
+        k: usize,
+        to: &mut [T],
+    ) {
+        let to = &mut to[k * self.by_entry + first * self.by_state..];
+        if self.by_state == 1 && first + N <= states {
+            to[..N].copy_from_slice(lanes);
             return;
         }
         for (lane, x) in lanes.iter().enumerate().take(states - first) {
-            to[at + (first + lane) * self.by_state] = *x;
+            to[lane * self.by_state] = *x;
         }
     }
 }

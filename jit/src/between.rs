@@ -3,22 +3,19 @@
 //! None of a phase's calls waits for another. Where there is one state, angles of several calls are the lanes of one.
 
 use crate::allocation::{AllocatedProgram, MemoryPlace};
+use crate::interpreter::sum_of_angles;
 use crate::native::SineInstructions;
 use crate::number::Number;
 use crate::tape::{CallBetween, TapeOperand};
 
 /// So many angles of one state are computed at once.
 const ANGLES: usize = 8;
-/// A sum of so many angles needs no memory from the heap.
-pub(crate) const FEW: usize = 16;
 
 /// The calls before a phase, by places in memory.
 #[derive(Debug, Default)]
 pub struct PlacedCalls {
-    /// Of an angle.
-    sines: Vec<(MemoryPlace, [usize; 2])>,
-    /// Of sums of angles.
-    sums: Vec<(Vec<MemoryPlace>, [usize; 2])>,
+    /// Of the sums of these angles.
+    sines: Vec<(Box<[MemoryPlace]>, [usize; 2])>,
     signs: Vec<(MemoryPlace, usize)>,
 }
 
@@ -32,12 +29,8 @@ impl PlacedCalls {
         for call in calls {
             match call {
                 CallBetween::SinCos { angles, values } => {
-                    let angles: Vec<MemoryPlace> = angles.iter().map(|angle| allocated.place(*angle)).collect();
-                    let values = values.map(cell);
-                    match angles[..] {
-                        [angle] => placed.sines.push((angle, values)),
-                        _ => placed.sums.push((angles, values)),
-                    }
+                    let angles = angles.iter().map(|angle| allocated.place(*angle)).collect();
+                    placed.sines.push((angles, values.map(cell)));
                 }
                 CallBetween::Sign { of, value } => placed.signs.push((allocated.place(*of), cell(*value))),
             }
@@ -52,41 +45,28 @@ impl PlacedCalls {
         read: impl Fn(&[T], MemoryPlace) -> [T; N],
         (by, fused): (SineInstructions, bool),
     ) {
-        let put = |frame: &mut [T], cell: usize, value: &[T]| frame[cell * N..][..N].copy_from_slice(value);
+        let put = |frame: &mut [T], cell: usize, value: [T; N]| frame.as_chunks_mut().0[cell] = value;
+        let sum = |frame: &[T], angles: &[MemoryPlace]| sum_of_angles(angles.iter().map(|angle| read(frame, *angle)));
         if N == 1 {
             for calls in self.sines.chunks(ANGLES) {
-                let mut angles = [T::zero(); ANGLES];
-                angles.iter_mut().zip(calls).for_each(|(angle, (place, _))| *angle = read(frame, *place)[0]);
-                let (sines, cosines) = by.sin_cos(&[angles], fused);
+                let mut sums = [[T::zero(); 2]; ANGLES];
+                sums.iter_mut().zip(calls).for_each(|(of, (angles, _))| *of = sum(frame, angles)[0]);
+                let (sines, cosines) = by.sin_cos(sums, fused);
                 for (k, (_, [sine, cosine])) in calls.iter().enumerate() {
-                    put(frame, *sine, &sines[k..=k]);
-                    put(frame, *cosine, &cosines[k..=k]);
+                    put(frame, *sine, [sines[k]; N]);
+                    put(frame, *cosine, [cosines[k]; N]);
                 }
             }
         } else {
-            for (angle, [sine, cosine]) in &self.sines {
-                let (sines, cosines) = by.sin_cos(&[read(frame, *angle)], fused);
-                put(frame, *sine, &sines);
-                put(frame, *cosine, &cosines);
+            for (angles, [sine, cosine]) in &self.sines {
+                let (sines, cosines) = by.sin_cos(sum(frame, angles), fused);
+                put(frame, *sine, sines);
+                put(frame, *cosine, cosines);
             }
-        }
-        for (angles, [sine, cosine]) in &self.sums {
-            let (mut few, many);
-            let terms: &[[T; N]] = if angles.len() <= FEW {
-                few = [[T::zero(); N]; FEW];
-                few.iter_mut().zip(angles).for_each(|(term, angle)| *term = read(frame, *angle));
-                &few[..angles.len()]
-            } else {
-                many = angles.iter().map(|angle| read(frame, *angle)).collect::<Vec<_>>();
-                &many
-            };
-            let (sines, cosines) = by.sin_cos(terms, fused);
-            put(frame, *sine, &sines);
-            put(frame, *cosine, &cosines);
         }
         for (of, sign) in &self.signs {
             let signs = read(frame, *of).map(T::sign);
-            put(frame, *sign, &signs);
+            put(frame, *sign, signs);
         }
     }
 }

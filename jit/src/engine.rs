@@ -123,6 +123,16 @@ impl<T: Number> Executable<T> {
         }
     }
 
+    /// The first lanes of the results of one state that was run.
+    pub fn first_lanes<'r>(&self, frame: &[T], results: impl Iterator<Item = &'r mut T>) {
+        match &self.code {
+            Some([code, _]) => {
+                code.results.iter().zip(results).for_each(|(place, x)| *x = code.at(frame, *place)[0]);
+            }
+            None => results.enumerate().for_each(|(k, x)| *x = self.result(frame, k, false)[0]),
+        }
+    }
+
     /// The lanes of a result of a block that was run.
     pub fn result<'a>(&'a self, frame: &'a [T], k: usize, is_batch: bool) -> &'a [T] {
         match &self.code {

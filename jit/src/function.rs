@@ -388,15 +388,22 @@ macro_rules! compiled_here {
 compiled_here!(f64, f32);
 
 fn run_state<T: Number>(executable: &Executable<T>, frame: &mut [T], inputs: &[&[T]], results: &mut [&mut [T]]) {
-    let lanes = executable.lanes(false);
-    let scalars = inputs.iter().flat_map(|array| array.iter());
-    for (block, x) in frame.chunks_exact_mut(lanes).zip(scalars) {
-        block.fill(*x);
+    match executable.lanes(false) {
+        1 => {
+            let mut rest = &mut frame[..];
+            for array in inputs {
+                let (own, others) = rest.split_at_mut(array.len());
+                own.copy_from_slice(array);
+                rest = others;
+            }
+        }
+        lanes => {
+            let scalars = inputs.iter().flat_map(|array| array.iter());
+            frame.chunks_exact_mut(lanes).zip(scalars).for_each(|(block, x)| block.fill(*x));
+        }
     }
     executable.run(frame, false);
-    for (k, result) in results.iter_mut().flat_map(|array| array.iter_mut()).enumerate() {
-        *result = executable.result(frame, k, false)[0];
-    }
+    executable.first_lanes(frame, results.iter_mut().flat_map(|array| array.iter_mut()));
 }
 
 fn run_states<T: Number>(
@@ -405,21 +412,38 @@ fn run_states<T: Number>(
     inputs: &[(&[T], BatchLayout)],
     results: &mut [(&mut [T], BatchLayout)],
 ) {
+    match function.executable.lanes(true) {
+        1 => run_blocks::<T, 1>(function, states, inputs, results),
+        2 => run_blocks::<T, 2>(function, states, inputs, results),
+        4 => run_blocks::<T, 4>(function, states, inputs, results),
+        8 => run_blocks::<T, 8>(function, states, inputs, results),
+        16 => run_blocks::<T, 16>(function, states, inputs, results),
+        lanes => unreachable!("no vector has {lanes} numbers"),
+    }
+}
+
+/// Blocks of as many states as a vector has lanes.
+fn run_blocks<T: Number, const N: usize>(
+    function: &LoadedFunction<T>,
+    states: usize,
+    inputs: &[(&[T], BatchLayout)],
+    results: &mut [(&mut [T], BatchLayout)],
+) {
     let LoadedFunction { inputs: taken, outputs, executable, .. } = function;
-    let lanes = executable.lanes(true);
     let mut frame = vec![T::default(); executable.frame_length(true)];
-    for first in (0..states).step_by(lanes) {
-        let mut at = 0;
+    for first in (0..states).step_by(N) {
+        let mut rest = frame.as_chunks_mut::<N>().0;
         for (port, (array, layout)) in taken.iter().zip(inputs) {
-            let length = port.len() * lanes;
-            layout.gather(array, [first, states], lanes, &mut frame[at..at + length]);
-            at += length;
+            let (own, others) = rest.split_at_mut(port.len());
+            layout.gather(array, [first, states], own);
+            rest = others;
         }
         executable.run(&mut frame, true);
         let mut k = 0;
         for (port, (array, layout)) in outputs.iter().zip(&mut *results) {
             for entry in 0..port.len() {
-                layout.scatter(executable.result(&frame, k, true), [first, states], entry, array);
+                let lanes: &[T; N] = executable.result(&frame, k, true).try_into().expect("as many numbers as lanes");
+                layout.scatter(lanes, [first, states], entry, array);
                 k += 1;
             }
         }

@@ -1,6 +1,5 @@
 //! Runs a tape step by step, over blocks of lanes: with the bits of machine code, wherever there is none.
 
-use crate::between::FEW;
 use crate::number::Number;
 use crate::tape::{CallBetween, ProgramTape, TapeAction, TapeOperand};
 
@@ -26,8 +25,8 @@ pub fn run<T: Number>(tape: &ProgramTape<T>, inputs: &[Block<T>], results: &mut 
         for call in &phase.calls {
             match call {
                 CallBetween::SinCos { angles, values: [sine, cosine] } => {
-                    let terms: Vec<Block<T>> = angles.iter().map(|a| read(&values, *a)).collect();
-                    (values[*sine], values[*cosine]) = sin_cos(&terms, tape.fused);
+                    let angle = sum_of_angles(angles.iter().map(|a| read(&values, *a)));
+                    (values[*sine], values[*cosine]) = sin_cos(angle, tape.fused);
                 }
                 CallBetween::Sign { of, value } => values[*value] = read(&values, *of).map(T::sign),
             }
@@ -53,30 +52,26 @@ pub fn run<T: Number>(tape: &ProgramTape<T>, inputs: &[Block<T>], results: &mut 
     }
 }
 
-/// Sines and cosines of sums of angles, lane by lane. Part of its caller, so that it is compiled for the caller's instructions.
+/// Sines and cosines of sums of angles in two pieces, lane by lane. Part of its caller, so that it is compiled for the caller's instructions.
 #[inline(always)]
-pub(crate) fn sin_cos<T: Number, const N: usize>(terms: &[[T; N]], fused: bool) -> ([T; N], [T; N]) {
-    match (terms, fused) {
-        ([angles], false) => T::sin_cos_lanes(*angles),
-        ([angles], true) => T::fused_sin_cos(angles.map(|angle| [angle, T::zero()])),
-        (_, false) => T::sin_cos_lanes_of_pairs(sums(terms)),
-        (_, true) => T::fused_sin_cos(sums(terms)),
+pub(crate) fn sin_cos<T: Number, const N: usize>(sums: [[T; 2]; N], fused: bool) -> ([T; N], [T; N]) {
+    match fused {
+        false => T::sin_cos_lanes_of_pairs(sums),
+        true => T::fused_sin_cos(sums),
     }
 }
 
-/// Sums of angles in two pieces, lane by lane.
-#[inline(always)]
-fn sums<T: Number, const N: usize>(terms: &[[T; N]]) -> [[T; 2]; N] {
-    let (mut few, mut many) = ([T::zero(); FEW], Vec::new());
-    let angles = match terms.len() <= FEW {
-        true => &mut few[..terms.len()],
-        false => {
-            many.resize(terms.len(), T::zero());
-            &mut many[..]
+/// The sum of these angles and what its rounding lost, lane by lane: as [`Real::sum_of_angles`](straightline_core::Real::sum_of_angles). Of one angle nothing is lost.
+#[inline]
+pub(crate) fn sum_of_angles<T: Number, const N: usize>(mut terms: impl Iterator<Item = [T; N]>) -> [[T; 2]; N] {
+    let mut sums = terms.next().expect("an angle has a term").map(|angle| [angle, T::zero()]);
+    for term in terms {
+        for ([sum, tail], angle) in sums.iter_mut().zip(term) {
+            let next = *sum + angle;
+            let added = next - *sum;
+            *tail = *tail + ((*sum - (next - added)) + (angle - added));
+            *sum = next;
         }
-    };
-    std::array::from_fn(|lane| {
-        angles.iter_mut().zip(terms).for_each(|(angle, term)| *angle = term[lane]);
-        T::sum_of_angles(angles)
-    })
+    }
+    sums
 }

@@ -120,29 +120,29 @@ impl SineInstructions {
         SineInstructions::ANY
     }
 
-    /// Sines and cosines of sums of angles, lane by lane: the same bits by all instructions.
+    /// Sines and cosines of sums of angles in two pieces, lane by lane: the same bits by all instructions.
     #[inline]
-    pub fn sin_cos<T: Number, const N: usize>(self, terms: &[[T; N]], fused: bool) -> ([T; N], [T; N]) {
+    pub fn sin_cos<T: Number, const N: usize>(self, sums: [[T; 2]; N], fused: bool) -> ([T; N], [T; N]) {
         match self.0 {
-            SineTarget::Any => interpreter::sin_cos(terms, fused),
+            SineTarget::Any => interpreter::sin_cos(sums, fused),
             // SAFETY: only `best` makes these, and only where the machine has the instructions
             #[cfg(target_arch = "x86_64")]
-            SineTarget::Avx2 => unsafe { sin_cos_by_avx2(terms, fused) },
+            SineTarget::Avx2 => unsafe { sin_cos_by_avx2(sums, fused) },
             // SAFETY: as above
             #[cfg(target_arch = "x86_64")]
-            SineTarget::Avx512 => unsafe { sin_cos_by_avx512(terms, fused) },
+            SineTarget::Avx512 => unsafe { sin_cos_by_avx512(sums, fused) },
         }
     }
 }
 
 #[cfg(target_arch = "x86_64")]
 #[target_feature(enable = "avx2,fma")]
-fn sin_cos_by_avx2<T: Number, const N: usize>(terms: &[[T; N]], fused: bool) -> ([T; N], [T; N]) {
-    interpreter::sin_cos(terms, fused)
+fn sin_cos_by_avx2<T: Number, const N: usize>(sums: [[T; 2]; N], fused: bool) -> ([T; N], [T; N]) {
+    interpreter::sin_cos(sums, fused)
 }
 
 #[cfg(target_arch = "x86_64")]
 #[target_feature(enable = "avx2,fma,avx512f,avx512vl,avx512dq")]
-fn sin_cos_by_avx512<T: Number, const N: usize>(terms: &[[T; N]], fused: bool) -> ([T; N], [T; N]) {
-    interpreter::sin_cos(terms, fused)
+fn sin_cos_by_avx512<T: Number, const N: usize>(sums: [[T; 2]; N], fused: bool) -> ([T; N], [T; N]) {
+    interpreter::sin_cos(sums, fused)
 }

@@ -7,4 +7,5 @@ mod emulated;
 mod emulator;
 mod encoding;
 mod encoding_aarch64;
+mod packing;
 mod store;
