@@ -89,9 +89,9 @@ impl<'t> Lines<'t> {
 }
 
 /// A section of the kernel: its name, and the lines of its block.
-type Section = (&'static str, Vec<&'static str>);
+type KernelSection = (&'static str, Vec<&'static str>);
 
-fn sections() -> Vec<Section> {
+fn sections() -> Vec<KernelSection> {
     let of = |section: &'static str| {
         let (name, body) = section.split_once('\n')?;
         Some((name, body.lines().filter(|line| !line.is_empty() && !line.starts_with("//")).collect()))
@@ -101,7 +101,7 @@ fn sections() -> Vec<Section> {
 
 /// What a register holds.
 #[derive(Clone, Debug)]
-enum Held {
+enum RegisterContent {
     /// The address of a port, as it is given.
     Given(usize),
     /// The same, among all memory of the device.
@@ -119,10 +119,10 @@ enum Held {
 struct PtxRun<'a, 'g, 't> {
     wanted: &'a PackageFunction<'g>,
     fused: bool,
-    sections: &'a [Section],
+    sections: &'a [KernelSection],
     values: &'a mut Values,
     ports: Vec<&'g Port>,
-    held: FxHashMap<&'t str, Held>,
+    held: FxHashMap<&'t str, RegisterContent>,
     /// How many registers of each kind there are.
     declared: Vec<(&'t str, usize)>,
     /// What was put out.
@@ -130,7 +130,12 @@ struct PtxRun<'a, 'g, 't> {
 }
 
 impl<'a, 'g, 't> PtxRun<'a, 'g, 't> {
-    fn new(wanted: &'a PackageFunction<'g>, fused: bool, sections: &'a [Section], values: &'a mut Values) -> Self {
+    fn new(
+        wanted: &'a PackageFunction<'g>,
+        fused: bool,
+        sections: &'a [KernelSection],
+        values: &'a mut Values,
+    ) -> Self {
         let results = wanted.outputs.iter().map(|port| vec![None; port.len()]).collect();
         let ports = wanted.inputs.iter().chain(wanted.outputs).collect();
         let (held, declared) = (FxHashMap::default(), Vec::new());
@@ -209,16 +214,18 @@ impl<'a, 'g, 't> PtxRun<'a, 'g, 't> {
     }
 
     /// What a register that is declared is written with: this once.
-    fn write(&mut self, register: &'t str, held: Held) -> Result<(), String> {
+    fn write(&mut self, register: &'t str, held: RegisterContent) -> Result<(), String> {
         let digits = register.len() - register.bytes().rev().take_while(u8::is_ascii_digit).count();
         let (kind, number) = register.split_at(digits);
         let declared = self.declared.iter().find(|(name, _)| *name == kind).map_or(0, |(_, count)| *count);
         // 01 is another register than 1
         let is_plain = number.parse::<usize>().is_ok_and(|k| k < declared && k.to_string() == number);
         let fits = match &held {
-            Held::Given(_) | Held::Global(_) | Held::Component(..) => kind == "%a" && number != "0",
-            Held::Number(value) => kind == self.kind(*value),
-            Held::Sum(terms) | Held::Tail(terms) => kind == self.kind(terms[0]),
+            RegisterContent::Given(_) | RegisterContent::Global(_) | RegisterContent::Component(..) => {
+                kind == "%a" && number != "0"
+            }
+            RegisterContent::Number(value) => kind == self.kind(*value),
+            RegisterContent::Sum(terms) | RegisterContent::Tail(terms) => kind == self.kind(terms[0]),
         };
         match is_plain && fits && self.held.insert(register, held).is_none() {
             true => Ok(()),
@@ -247,7 +254,7 @@ impl<'a, 'g, 't> PtxRun<'a, 'g, 't> {
         };
         let value = match (value, self.held.get(operand)) {
             (Some((x, of)), _) if f64::is_finite(x) => self.values.constant(x, of),
-            (None, Some(Held::Number(value))) => *value,
+            (None, Some(RegisterContent::Number(value))) => *value,
             _ => return Err(format!("`{operand}` is no number")),
         };
         match self.values.format(value) == format {
@@ -305,7 +312,7 @@ impl<'a, 'g, 't> PtxRun<'a, 'g, 't> {
             _ => return Err("an instruction that is not known".into()),
         };
         let value = self.demanded(value)?;
-        self.write(operands[0], Held::Number(value))
+        self.write(operands[0], RegisterContent::Number(value))
     }
 
     fn of_addresses(&mut self, operation: &str, operands: &[&'t str]) -> Result<(), String> {
@@ -313,19 +320,23 @@ impl<'a, 'g, 't> PtxRun<'a, 'g, 't> {
         let of = match (operation, operands) {
             ("ld.param.u64", [_, parameter]) => {
                 let name = |port: &Port| format!("[{}_batch_soa${}]", self.wanted.name, port.name);
-                Held::Given(self.ports.iter().position(|port| name(port) == *parameter).ok_or("no parameter")?)
+                RegisterContent::Given(
+                    self.ports.iter().position(|port| name(port) == *parameter).ok_or("no parameter")?,
+                )
             }
             ("cvta.to.global.u64", [_, a]) => match held(a) {
-                Some(Held::Given(port)) => Held::Global(port),
+                Some(RegisterContent::Given(port)) => RegisterContent::Global(port),
                 _ => return Err("an address as it is given is expected".into()),
             },
             ("add.s64", [_, a, "%a0"]) => match held(a) {
-                Some(Held::Global(port)) if self.ports[port].wrapper.is_none() => Held::Component(port, 0),
+                Some(RegisterContent::Global(port)) if self.ports[port].wrapper.is_none() => {
+                    RegisterContent::Component(port, 0)
+                }
                 _ => return Err("the address of numbers of all states is expected".into()),
             },
             ("mad.wide.u32", [_, "%r4", distance, a]) => match (held(a), distance.parse::<usize>()) {
-                (Some(Held::Component(port, 0)), Ok(distance)) if distance % self.bytes() == 0 => {
-                    Held::Component(port, distance / self.bytes())
+                (Some(RegisterContent::Component(port, 0)), Ok(distance)) if distance % self.bytes() == 0 => {
+                    RegisterContent::Component(port, distance / self.bytes())
                 }
                 _ => return Err("the address of a component is expected".into()),
             },
@@ -341,8 +352,10 @@ impl<'a, 'g, 't> PtxRun<'a, 'g, 't> {
         let (register, offset) = inner.split_once('+').unwrap_or((inner, "0"));
         let offset: usize = offset.parse().map_err(|_| WRONG)?;
         let (port, component) = match self.held.get(register) {
-            Some(Held::Component(port, component)) if offset == 0 => (*port, *component),
-            Some(Held::Global(port)) if self.ports[*port].wrapper.is_some() && offset % self.bytes() == 0 => {
+            Some(RegisterContent::Component(port, component)) if offset == 0 => (*port, *component),
+            Some(RegisterContent::Global(port))
+                if self.ports[*port].wrapper.is_some() && offset % self.bytes() == 0 =>
+            {
                 (*port, offset / self.bytes())
             }
             _ => return Err(WRONG.into()),
@@ -398,21 +411,21 @@ impl<'a, 'g, 't> PtxRun<'a, 'g, 't> {
             "next_angle" => {
                 let mut terms = self.angle(of("before")?, of("lost")?, format)?;
                 terms.push(self.number(of("term")?, format)?);
-                self.write(of("sum")?, Held::Sum(terms.clone()))?;
-                self.write(of("tail")?, Held::Tail(terms))
+                self.write(of("sum")?, RegisterContent::Sum(terms.clone()))?;
+                self.write(of("tail")?, RegisterContent::Tail(terms))
             }
             "sin_cos" | "sin_cos_fused" if (kind == "sin_cos_fused") == self.fused => {
                 let terms = self.angle(of("sum")?, of("tail")?, format)?;
                 let angle = self.values.angle(terms);
                 let (sine, cosine) = self.values.sin_cos(angle, Sines::Precise);
-                self.write(of("sine")?, Held::Number(sine))?;
-                self.write(of("cosine")?, Held::Number(cosine))
+                self.write(of("sine")?, RegisterContent::Number(sine))?;
+                self.write(of("cosine")?, RegisterContent::Number(cosine))
             }
             "sign" => {
                 let a = self.number(of("a")?, format)?;
                 let sign = self.values.sign(a);
                 let sign = self.demanded(sign)?;
-                self.write(of("result")?, Held::Number(sign))
+                self.write(of("result")?, RegisterContent::Number(sign))
             }
             _ => Err("a block of another kind".into()),
         }
@@ -420,7 +433,9 @@ impl<'a, 'g, 't> PtxRun<'a, 'g, 't> {
 
     /// The terms of an angle in two numbers.
     fn angle(&mut self, sum: &str, tail: &str, format: TextFormat) -> Result<Vec<TextValue>, String> {
-        if let (Some(Held::Sum(terms)), Some(Held::Tail(lost))) = (self.held.get(sum), self.held.get(tail)) {
+        if let (Some(RegisterContent::Sum(terms)), Some(RegisterContent::Tail(lost))) =
+            (self.held.get(sum), self.held.get(tail))
+        {
             let is_one = terms == lost && self.values.format(terms[0]) == format;
             return is_one.then(|| terms.clone()).ok_or_else(|| "the two parts of two angles".into());
         }

@@ -142,8 +142,8 @@ fn all_functions() -> Vec<Function> {
 }
 
 #[test]
-#[ignore = "slow proof: orders of long functions are searched"]
-fn slow_proof_that_objects_of_all_functions_of_a_quadruped_call_nothing() {
+#[ignore = "a minute or more: orders of long functions are searched"]
+fn long_proof_that_objects_of_all_functions_of_a_quadruped_call_nothing() {
     calls_nothing("solo12.urdf", (TargetMachine::CORTEX_M4F, Memory::Flash), &all_functions());
 }
 

@@ -281,8 +281,8 @@ fn derivatives_and_regressors_have_the_bits_of_their_programs() {
 
 /// Robots of any shape and style with all functions: `cargo test --release -p straightline-codegen --test suite c99:: -- --ignored`.
 #[test]
-#[ignore = "slow proof: compiles 40 robots with all functions six times"]
-fn slow_proof_many_random_robots_have_the_bits_of_their_programs() {
+#[ignore = "a minute or more: compiles 40 robots with all functions six times"]
+fn long_proof_many_random_robots_have_the_bits_of_their_programs() {
     let mut compiled = 0;
     for seed in 100..118u64 {
         let mut random = crate::written::Random(seed);

@@ -151,8 +151,8 @@ fn derivatives_of_a_robot_on_springs_with_a_link_that_bends_are_those_of_the_sec
 }
 
 #[test]
-#[ignore = "slow proof: seventeen joints, whose programs are searched"]
-fn slow_proof_that_derivatives_of_an_arm_in_many_segments_are_those_of_the_second_author() {
+#[ignore = "a minute or more: seventeen joints, whose programs are searched"]
+fn long_proof_that_derivatives_of_an_arm_in_many_segments_are_those_of_the_second_author() {
     Flexible::new(&short(), "", true).hold_derivatives(8);
     Flexible::new(TOWER, SUPPORT, true).hold_derivatives(6);
     Flexible::new(ARM, "", true).hold_derivatives(3 + 3 * 3 + 4 * 2);

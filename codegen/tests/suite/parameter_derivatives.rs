@@ -62,8 +62,8 @@ fn derivatives_by_a_link_and_a_tool_on_a_floating_base_are_those_of_the_second_a
 }
 
 #[test]
-#[ignore = "slow proof: what scenes skip is compiled step by step"]
-fn slow_proof_that_derivatives_by_a_link_and_a_tool_in_both_formats_on_both_bases_are_those_of_the_second_author() {
+#[ignore = "a minute or more: what scenes skip is compiled step by step"]
+fn long_proof_that_derivatives_by_a_link_and_a_tool_in_both_formats_on_both_bases_are_those_of_the_second_author() {
     let branched = Source::new("branched.toml", include_str!("../files/branched.toml"));
     let inputs = INPUTS.replace("flange", "camera");
     for format in ["", F32] {
