@@ -335,7 +335,7 @@ impl<'a, 'g, 't> PtxRun<'a, 'g, 't> {
                 _ => return Err("the address of numbers of all states is expected".into()),
             },
             ("mad.wide.u32", [_, "%r4", distance, a]) => match (held(a), distance.parse::<usize>()) {
-                (Some(RegisterContent::Component(port, 0)), Ok(distance)) if distance % self.bytes() == 0 => {
+                (Some(RegisterContent::Component(port, 0)), Ok(distance)) if distance.is_multiple_of(self.bytes()) => {
                     RegisterContent::Component(port, distance / self.bytes())
                 }
                 _ => return Err("the address of a component is expected".into()),
@@ -354,7 +354,7 @@ impl<'a, 'g, 't> PtxRun<'a, 'g, 't> {
         let (port, component) = match self.held.get(register) {
             Some(RegisterContent::Component(port, component)) if offset == 0 => (*port, *component),
             Some(RegisterContent::Global(port))
-                if self.ports[*port].wrapper.is_some() && offset % self.bytes() == 0 =>
+                if self.ports[*port].wrapper.is_some() && offset.is_multiple_of(self.bytes()) =>
             {
                 (*port, offset / self.bytes())
             }
@@ -391,10 +391,11 @@ impl<'a, 'g, 't> PtxRun<'a, 'g, 't> {
         let known = self.sections.iter().find_map(|(name, body)| {
             let here = lines.all.get(first..first + body.len())?;
             let mut places = FxHashMap::default();
-            here.iter()
-                .zip(body)
-                .all(|((_, line), wanted)| is_line(line, wanted, &mut places))
-                .then(|| (*name, body.len(), places))
+            here.iter().zip(body).all(|((_, line), wanted)| is_line(line, wanted, &mut places)).then_some((
+                *name,
+                body.len(),
+                places,
+            ))
         });
         let Some((name, length, places)) = known else {
             return Err(ReadingStop::at(start, "a block that is not in the kernel"));

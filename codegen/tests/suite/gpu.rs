@@ -4,7 +4,7 @@ use crate::c99::{differences, numbers, robot, True};
 use crate::c99_readback::{changed, is_none, kinds, words};
 use crate::ptx_machine::Entry;
 use crate::standalone::Folder;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::process::Command;
 use straightline_codegen::compile::checked_package;
 use straightline_codegen::emit::c99::opencl::OPENCL;
@@ -201,7 +201,7 @@ fn assembler() -> Option<PathBuf> {
 }
 
 /// What the assembler says of a text: registers, and bytes of spills, of the entry that takes most.
-fn assembled(ptxas: &PathBuf, text: &str, machine: &str) -> [u32; 2] {
+fn assembled(ptxas: &Path, text: &str, machine: &str) -> [u32; 2] {
     let folder = Folder::new(&format!("ptxas-{machine}"));
     let (source, object) = (folder.file("robot.ptx"), folder.file("robot.cubin"));
     std::fs::write(&source, text).expect("it can be written");

@@ -68,7 +68,7 @@ impl<'t> Thread<'_, 't> {
         let (register, offset) = inner.split_once('+').unwrap_or((inner, "0"));
         let address = self.get(register) + offset.parse::<u64>().expect("an offset");
         let (array, place) = (address / ARRAYS - 1, address % ARRAYS);
-        assert!(place % self.bytes == 0, "an address between numbers");
+        assert!(place.is_multiple_of(self.bytes), "an address between numbers");
         &mut self.arrays[array as usize][(place / self.bytes) as usize]
     }
 

@@ -146,10 +146,10 @@ fn with_pairs(graph: &Graph, hope: f64) -> usize {
     let mut all = Pairing { graph, users: &users, places, pairs: HashSet::new(), instructions: 0 };
     while !ready.is_empty() {
         let mut best: Option<(f64, usize, usize)> = None;
-        for i in 0..ready.len() {
-            for j in (0..ready.len()).filter(|j| *j != i && is_alike(graph.op(ready[i]), graph.op(ready[*j]))) {
-                let (a, b) = (ready[i], ready[j]);
-                let gain = 1.0 - all.operands(a, b).0 as f64 + hope * all.hopes(a, b) as f64;
+        for (i, a) in ready.iter().enumerate() {
+            let alike = |(j, b): &(usize, &NodeId)| *j != i && is_alike(graph.op(*a), graph.op(**b));
+            for (j, b) in ready.iter().enumerate().filter(alike) {
+                let gain = 1.0 - all.operands(*a, *b).0 as f64 + hope * all.hopes(*a, *b) as f64;
                 if gain > 0.0 && best.is_none_or(|(most, ..)| gain > most) {
                     best = Some((gain, i, j));
                 }
