@@ -234,8 +234,8 @@ fn long_proof_that_no_package_with_a_word_changed_is_let_through() {
 fn arrays_longer_than_what_is_put_there_are_refused() {
     let mut count = 0;
     for (name, generated) in kinds() {
-        let files = (C99_SOURCE.files)(&generated, "robot");
-        let mut reader = CReader::new(&generated, "robot");
+        let files = (C99_SOURCE.files)(generated, "robot");
+        let mut reader = CReader::new(generated, "robot");
         let c = files.iter().position(|(file, _)| file.ends_with(".c")).expect("it is there");
         for line in files[c].1.lines() {
             let words: Vec<&str> = line.trim().trim_end_matches("];").split([' ', '[']).collect();
