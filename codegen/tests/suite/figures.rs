@@ -180,7 +180,9 @@ fn constants_say_what_the_report_says_and_nothing_else_of_the_text_changes() {
     let wrong = Generated { text: with.text.replace("pub flash_bytes: u32", "pub flash_bytes: u64"), ..with.clone() };
     assert!(check(&wrong).is_err());
     // packages are not what was measured
-    assert!(PACKAGES.iter().all(|package| (package.refusal)(&with).is_some() && (package.refusal)(&without).is_none()));
+    assert!(PACKAGES.iter().all(|package| (package.refusal)(&with).is_some()));
+    let mut for_machines = PACKAGES.iter().filter(|package| ["c-abi", "c99"].contains(&package.name));
+    assert!(for_machines.all(|package| (package.refusal)(&without).is_none()));
 }
 
 #[test]
