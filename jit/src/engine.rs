@@ -124,12 +124,18 @@ impl<T: Number> Executable<T> {
     }
 
     /// The first lanes of the results of one state that was run.
-    pub fn first_lanes<'r>(&self, frame: &[T], results: impl Iterator<Item = &'r mut T>) {
+    pub fn first_lanes(&self, frame: &[T], results: &mut [&mut [T]]) {
         match &self.code {
             Some([code, _]) => {
-                code.results.iter().zip(results).for_each(|(place, x)| *x = code.at(frame, *place)[0]);
+                let mut places = code.results.iter();
+                for array in results {
+                    array.iter_mut().zip(places.by_ref()).for_each(|(x, place)| *x = code.at(frame, *place)[0]);
+                }
             }
-            None => results.enumerate().for_each(|(k, x)| *x = self.result(frame, k, false)[0]),
+            None => {
+                let entries = results.iter_mut().flat_map(|array| array.iter_mut());
+                entries.enumerate().for_each(|(k, x)| *x = self.result(frame, k, false)[0]);
+            }
         }
     }
 
@@ -178,6 +184,7 @@ impl<T: Number> MachineCode<T> {
 }
 
 impl<T: Number> MachineCode<T> {
+    #[inline]
     fn at<'a>(&'a self, frame: &'a [T], place: MemoryPlace) -> &'a [T] {
         let (memory, at) = match place {
             MemoryPlace::Cell(cell) => (frame, cell),

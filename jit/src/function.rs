@@ -5,6 +5,7 @@ use crate::engine::{Executable, ExecutionMode};
 use crate::number::Number;
 use crate::tape::ProgramTape;
 use std::fmt;
+use std::sync::Mutex;
 use straightline_codegen::program::TracedProgram;
 use straightline_graph::expr::{Counts, Graph, Port, Sines};
 use straightline_graph::schedule::{schedule, Schedule, ScheduleLimits};
@@ -19,6 +20,8 @@ pub struct LoadedFunction<T> {
     outputs: Vec<Port>,
     counts: Counts,
     executable: Executable<T>,
+    /// The frame of a call of one state that has ended, for the next one; empty while it is in use.
+    spare: Mutex<Vec<T>>,
 }
 
 /// What is wrong with a call.
@@ -106,6 +109,7 @@ impl<T: Number> LoadedFunction<T> {
             outputs: graph.outputs.clone(),
             counts: graph.counts(),
             executable: T::executable((graph, schedule), fused, execution),
+            spare: Mutex::default(),
         }
     }
 
@@ -139,7 +143,7 @@ impl<T: Number> LoadedFunction<T> {
         self.executable.code_bytes()
     }
 
-    /// For one state. Whoever calls it often takes a [`Runner`].
+    /// For one state. Whoever calls it often, and from several threads, takes a [`Runner`] each.
     ///
     /// # Errors
     /// If arrays are missing, or have not the lengths of the [inputs](Self::inputs) and [outputs](Self::outputs).
@@ -166,7 +170,11 @@ impl<T: Number> LoadedFunction<T> {
 
     /// What calls it without asking for memory.
     pub fn runner(&self) -> Runner<'_, T> {
-        Runner { function: self, frame: vec![T::default(); self.executable.frame_length(false)] }
+        // what a frame has from a call before is written anew before it is read; who comes second takes memory
+        let spare = self.spare.try_lock().map(|mut spare| std::mem::take(&mut *spare)).unwrap_or_default();
+        let length = self.executable.frame_length(false);
+        let frame = if spare.len() == length { spare } else { vec![T::default(); length] };
+        Runner { function: self, frame }
     }
 
     /// For many states, each array with its layout. Results have the bits of one call per state.
@@ -319,6 +327,15 @@ pub struct Runner<'a, T> {
     frame: Vec<T>,
 }
 
+/// Leaves its memory to the next one.
+impl<T> Drop for Runner<'_, T> {
+    fn drop(&mut self) {
+        if let Ok(mut spare) = self.function.spare.try_lock() {
+            *spare = std::mem::take(&mut self.frame);
+        }
+    }
+}
+
 impl<T: Number> Runner<'_, T> {
     /// For one state.
     ///
@@ -403,7 +420,7 @@ fn run_state<T: Number>(executable: &Executable<T>, frame: &mut [T], inputs: &[&
         }
     }
     executable.run(frame, false);
-    executable.first_lanes(frame, results.iter_mut().flat_map(|array| array.iter_mut()));
+    executable.first_lanes(frame, results);
 }
 
 fn run_states<T: Number>(

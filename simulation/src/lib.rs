@@ -14,6 +14,7 @@ pub mod drives;
 mod failure;
 pub mod gains;
 pub mod html;
+mod layout;
 pub mod motion;
 mod ode;
 pub mod optimize;

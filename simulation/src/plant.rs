@@ -5,13 +5,14 @@
 //! energy − W + L − electrical + lost is constant, which measures a simulation.
 
 use crate::drives::{slack_state, smooth_losses, DriveEnergies};
+use crate::layout::StateLayout;
 use crate::simulate::Method;
 use std::borrow::Cow;
 use std::fmt;
 use std::sync::Arc;
 use straightline_core::algorithms::{
-    bias_force, drive_energy, drive_states, driven_motion, forward_dynamics_aba, kinetic_energy, mass_matrix,
-    potential_energy, DrivenMotion, Links,
+    bias_force, drive_energy, driven_motion, forward_dynamics_aba, kinetic_energy, mass_matrix, potential_energy,
+    DrivenMotion, Links,
 };
 use straightline_core::drive::Actuator;
 use straightline_core::model::{Coulomb, Joint, JointEffects, Model};
@@ -24,6 +25,8 @@ pub struct Plant {
     pub model: Model<f64>,
     /// Of every drive whether its input is a current.
     currents: Vec<bool>,
+    /// Of the model.
+    layout: StateLayout,
     /// What computes its motion; none: the generic runtime.
     equations: Option<Arc<dyn MotionEquations>>,
 }
@@ -78,7 +81,8 @@ impl Plant {
             smooth_losses(drive, coulomb_speed);
         }
         let currents = vec![false; model.drives.len()];
-        Plant { model, currents, equations: None }
+        let layout = StateLayout::new(&model);
+        Plant { model, currents, layout, equations: None }
     }
 
     /// The same with amplifiers that keep up a current, as far as the voltage allows: the inputs of these drives are in A, and their
@@ -91,6 +95,7 @@ impl Plant {
                 motor.inductance = None;
             }
         }
+        self.layout = StateLayout::new(&self.model);
         self
     }
 
@@ -177,7 +182,7 @@ impl Plant {
     /// Number of states.
     pub fn states(&self) -> usize {
         let of_drives = if self.is_driven() { DriveEnergies::COUNT } else { 0 };
-        self.model.nq() + self.model.nv() + self.drive_states() + 2 + of_drives
+        self.layout.nq + self.layout.nv + self.drive_states() + 2 + of_drives
     }
 
     /// Whether the robot has drives.
@@ -187,7 +192,7 @@ impl Plant {
 
     /// Number of entries of x.
     pub fn drive_states(&self) -> usize {
-        drive_states(&self.model)
+        self.layout.drives
     }
 
     /// The state vector of a configuration and a velocity; drives have slack springs and no currents.
@@ -204,21 +209,21 @@ impl Plant {
 
     /// q, q̇, work and losses of a state.
     pub fn split<'a>(&self, state: &'a [f64]) -> (&'a [f64], &'a [f64], f64, f64) {
-        let (q, rest) = state.split_at(self.model.nq());
-        let (qd, rest) = rest.split_at(self.model.nv());
+        let (q, rest) = state.split_at(self.layout.nq);
+        let (qd, rest) = rest.split_at(self.layout.nv);
         let energies = &rest[self.drive_states()..];
         (q, qd, energies[0], energies[1])
     }
 
     /// x of a state.
     pub fn x<'a>(&self, state: &'a [f64]) -> &'a [f64] {
-        let first = self.model.nq() + self.model.nv();
+        let first = self.layout.nq + self.layout.nv;
         &state[first..first + self.drive_states()]
     }
 
     /// What the drives of a state have taken and lost.
     pub fn drive_energies(&self, state: &[f64]) -> DriveEnergies {
-        DriveEnergies::from_slice(&state[self.model.nq() + self.model.nv() + self.drive_states() + 2..])
+        DriveEnergies::from_slice(&state[self.layout.nq + self.layout.nv + self.drive_states() + 2..])
     }
 
     /// All energy that is stored in a state \[J\]: [`energy`](Plant::energy), and rotors, transmissions and inductances of drives.
@@ -231,7 +236,7 @@ impl Plant {
     /// The motion of robot and drives, and what goes on in these.
     pub fn driven(&self, state: &[f64], action: &Action) -> DrivenMotion<f64> {
         let (q, qd, ..) = self.split(state);
-        let (q, x) = (configuration(&self.model, q), self.x(state));
+        let (q, x) = (self.configuration(q), self.x(state));
         let u = self.inputs(qd, x, &action.u);
         let bias = self.equations().bias_force(&q, qd);
         let bias: Vec<f64> = bias.iter().zip(&action.tau).map(|(h, tau)| h - tau).collect();
@@ -263,14 +268,17 @@ impl Plant {
 
     /// Power that friction turns into heat \[W\]: Σ (d q̇ + f(q̇)) q̇.
     pub fn losses(&self, q: &[f64], qd: &[f64]) -> f64 {
-        joint_friction(&self.model, q, qd)
+        match self.layout.loses {
+            true => joint_friction(&self.model, q, qd),
+            false => 0.0,
+        }
     }
 
     /// The time derivative of the state.
     pub fn rate(&self, state: &[f64], action: &Action, rate: &mut [f64]) {
-        let (nq, nv) = (self.model.nq(), self.model.nv());
+        let (nq, nv) = (self.layout.nq, self.layout.nv);
         let (q, qd, ..) = self.split(state);
-        let q = configuration(&self.model, q);
+        let q = self.configuration(q);
         rate[..nq].copy_from_slice(&self.configuration_rate(&q, qd));
         let after = nq + nv + self.drive_states();
         if self.is_driven() {
@@ -289,20 +297,31 @@ impl Plant {
     }
 
     /// dq/dt: q̇ of joints; of a floating base R v and ½ quaternion ∘ ω, of a ball joint the latter.
-    pub(crate) fn configuration_rate(&self, q: &[f64], qd: &[f64]) -> Vec<f64> {
-        let mut rate = vec![0.0; self.model.nq()];
+    pub(crate) fn configuration_rate<'a>(&self, q: &[f64], qd: &'a [f64]) -> Cow<'a, [f64]> {
+        if self.layout.is_plain {
+            return Cow::Borrowed(qd);
+        }
+        let mut rate = vec![0.0; self.layout.nq];
         let qd = self.model.tree_rates(&self.model.tree_positions(q), qd);
         for joint in self.model.free_joints() {
             let own = &mut rate[joint.iq..joint.iq + joint.kind.nq()];
             joint.kind.configuration_rate(joint.coordinates(q), joint.rates(&qd), own);
         }
-        rate
+        Cow::Owned(rate)
     }
 
     /// The state with quaternions of length one and loops that are closed.
     pub fn normalised(&self, state: &[f64]) -> Vec<f64> {
-        let nq = self.model.nq();
-        [&configuration(&self.model, &state[..nq]), &state[nq..]].concat()
+        let (q, rest) = state.split_at(self.layout.nq);
+        [&self.configuration(q), rest].concat()
+    }
+
+    /// q with quaternions of length one and loops that are closed.
+    fn configuration<'a>(&self, q: &'a [f64]) -> Cow<'a, [f64]> {
+        match self.layout.is_plain {
+            true => Cow::Borrowed(q),
+            false => Cow::Owned(configuration(&self.model, q)),
+        }
     }
 }
 

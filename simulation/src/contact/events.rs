@@ -50,7 +50,7 @@ impl ContactWorld<'_> {
         for _ in 0..times {
             let dq = projection(&self.factor(&state[..nq]), &s, &s.value, RIDGE);
             let change = self.plant.configuration_rate(&state[..nq], &dq);
-            state[..nq].iter_mut().zip(change).for_each(|(q, d)| *q += d);
+            state[..nq].iter_mut().zip(change.iter()).for_each(|(q, d)| *q += d);
             *state = self.plant.normalised(state);
             s = rigid(state);
             if largest(&s) < 1e-14 {

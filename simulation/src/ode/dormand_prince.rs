@@ -94,6 +94,7 @@ pub(super) fn integrate(
     let (mut accepted, mut was_rejected) = (0, false);
     let (mut stiff, mut not_stiff) = (0, 0);
     let (mut stage, mut new, mut rate) = (vec![0.0; n], vec![0.0; n], vec![0.0; n]);
+    let mut sums = [0; 3].map(|_| vec![0.0; n]);
     while t < piece.end {
         piece.pace.count(t)?;
         // what is left is one step, or two that are alike
@@ -122,7 +123,7 @@ pub(super) fn integrate(
         along(&mut new, &y, h_now, B, &k);
         let t_new = if is_last { piece.end } else { t + h_now };
         let error = match is_finite && new.iter().all(|x| x.is_finite()) {
-            true => error(piece, tolerance, h_now, (&y, &new), &k),
+            true => error(piece, tolerance, h_now, (&y, &new), &k, &mut sums),
             false => f64::INFINITY,
         };
         let error = if error.is_nan() { f64::INFINITY } else { error };
@@ -171,19 +172,36 @@ pub(super) fn integrate(
 
 /// `out` = y + h Σ weights · k.
 fn along(out: &mut [f64], y: &[f64], h: f64, weights: &[(usize, f64)], k: &[Vec<f64>]) {
-    for (i, out) in out.iter_mut().enumerate() {
-        *out = y[i] + h * weights.iter().map(|(j, w)| w * k[*j][i]).sum::<f64>();
+    weighted_sum(out, weights, k);
+    out.iter_mut().zip(y).for_each(|(out, y)| *out = y + h * *out);
+}
+
+/// `out` = Σ weights · k, in the order of the weights: all entries of a stage one after the other, so that they are summed in vectors.
+fn weighted_sum(out: &mut [f64], weights: &[(usize, f64)], k: &[Vec<f64>]) {
+    let [(first, weight), others @ ..] = weights else { unreachable!("every sum has a first stage") };
+    out.iter_mut().zip(&k[*first]).for_each(|(out, k)| *out = weight * k);
+    for (stage, weight) in others {
+        out.iter_mut().zip(&k[*stage]).for_each(|(out, k)| *out += weight * k);
     }
 }
 
-/// The error of a step by what is allowed: e₅²/√(e₅² + 0.01 e₃²), both by scale (HNW, II.10).
-fn error(piece: &Piece, tolerance: f64, h: f64, (y, new): (&[f64], &[f64]), k: &[Vec<f64>]) -> f64 {
+/// The error of a step by what is allowed: e₅²/√(e₅² + 0.01 e₃²), both by scale (HNW, II.10); `sums` is room for three states.
+fn error(
+    piece: &Piece,
+    tolerance: f64,
+    h: f64,
+    (y, new): (&[f64], &[f64]),
+    k: &[Vec<f64>],
+    [e5, b, b3]: &mut [Vec<f64>; 3],
+) -> f64 {
     let n = y.len();
+    weighted_sum(e5, E5, k);
+    weighted_sum(b, B, k);
+    weighted_sum(b3, B3, k);
     let (mut fifth, mut third) = (0.0, 0.0);
     for i in 0..n {
         let scale = piece.scale(tolerance, y[i].abs().max(new[i].abs()));
-        let sum = |weights: &[(usize, f64)]| weights.iter().map(|(j, w)| w * k[*j][i]).sum::<f64>();
-        let (e5, e3) = (sum(E5), sum(B) - sum(B3));
+        let (e5, e3) = (e5[i], b[i] - b3[i]);
         fifth += (e5 / scale) * (e5 / scale);
         third += (e3 / scale) * (e3 / scale);
     }
@@ -218,7 +236,12 @@ fn interpolation(
     let way = of(&|i| new[i] - y[i]);
     let bend = of(&|i| h * k[0][i] - way[i]);
     let rest = of(&|i| way[i] - h * rate[i] - bend[i]);
-    let more = |d: &[(usize, f64)]| of(&|i| h * d.iter().map(|(j, w)| w * k[*j][i]).sum::<f64>());
+    let more = |d: &[(usize, f64)]| {
+        let mut sum = vec![0.0; n];
+        weighted_sum(&mut sum, d, &k);
+        sum.iter_mut().for_each(|x| *x *= h);
+        sum
+    };
     let [a, b, c, d] = D.map(more);
     [way, bend, rest, a, b, c, d]
 }

@@ -102,18 +102,22 @@ impl Piece<'_> {
     /// The rates of all states; `false` if one of them is not finite.
     fn rate(&self, t: f64, y: &[f64], rate: &mut [f64]) -> bool {
         self.evaluations.set(self.evaluations.get() + 1);
-        if let Some(i) = y.iter().position(|x| !x.is_finite()) {
-            self.blame.set(Some((i, t)));
+        if !self.are_finite(t, y) {
             return false;
         }
         self.equations.rate(t, y, rate);
-        match rate.iter().position(|x| !x.is_finite()) {
-            None => true,
-            Some(i) => {
-                self.blame.set(Some((i, t)));
-                false
-            }
+        self.are_finite(t, rate)
+    }
+
+    /// Whether numbers at a time are finite; the first that is not is to blame.
+    fn are_finite(&self, t: f64, numbers: &[f64]) -> bool {
+        // all of them, in vectors: nearly always they are
+        if numbers.iter().fold(true, |finite, x| finite & x.is_finite()) {
+            return true;
         }
+        let first = numbers.iter().position(|x| !x.is_finite());
+        self.blame.set(first.map(|i| (i, t)));
+        false
     }
 
     /// Whether a step so short is lost in the rounding of the time.
