@@ -150,7 +150,7 @@ fn slow_proof_that_robots_of_seven_joints_agree_with_the_second_author() {
 
 #[test]
 #[ignore = "slow proof: every kind of robot of five to nine joints"]
-fn slow_proof_that_robots_of_five_to_nine_joints_agree_with_the_second_author() {
+fn long_proof_that_robots_of_five_to_nine_joints_agree_with_the_second_author() {
     [5, 7, 9].into_iter().for_each(robots_of);
 }
 
@@ -192,7 +192,7 @@ fn operations_grow_linearly_with_the_number_of_links() {
 
 #[test]
 #[ignore = "slow proof: chains of 150 links"]
-fn slow_proof_that_operations_grow_linearly_with_the_number_of_links() {
+fn long_proof_that_operations_grow_linearly_with_the_number_of_links() {
     operations_grow_linearly(30);
 }
 
