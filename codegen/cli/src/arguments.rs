@@ -15,7 +15,7 @@ use straightline_codegen::options::GivenOptions;
 use straightline_codegen::Function;
 
 pub use crate::bench::Bench;
-pub use crate::motion::{Analyze, Simulate};
+pub use crate::motion::{Analyze, Simulate, ViewArguments};
 
 pub const EXIT_CODES: &str = "\
 Exit codes:
@@ -113,6 +113,20 @@ Examples:
 
 {EXIT_CODES}"))]
     Analyze(Analyze),
+    /// Draw a robot in motion: a page for the browser, complete in one file
+    #[command(after_help = format!("\
+RUN is what `simulate` or `analyze` writes (CSV, JSON or Parquet): the columns q.JOINT move the robot, all columns are
+plotted, and forces and torques are drawn as arrows. A motion in TOML (codegen/SIMULATION.md) is analysed first.
+Without RUN each joint moves through its range in turn.
+
+Examples:
+  straightline view panda.urdf -o panda.html
+  straightline simulate panda.urdf --input swing.toml --output swing.csv && straightline view panda.urdf swing.csv -o swing.html
+  straightline view panda.urdf reach.toml -o reach.html
+  straightline view solo12.urdf --floating-base -o solo12.html
+
+{EXIT_CODES}"))]
+    View(ViewArguments),
     /// Write a self-contained package for other languages
     #[command(after_help = format!("\
 With `--c-abi` the directory becomes a Rust package without dependencies; `cargo build --release` in it gives a shared
@@ -159,6 +173,7 @@ impl CliCommand {
             CliCommand::Bench(a) => &a.model,
             CliCommand::Simulate(a) => return a.model(),
             CliCommand::Analyze(a) => return a.model(),
+            CliCommand::View(a) => return a.model(),
             CliCommand::Export(a) => &a.model,
             CliCommand::Convert(_) | CliCommand::Functions(_) | CliCommand::Explain(_) => return None,
         })
@@ -183,6 +198,7 @@ impl CliCommand {
             CliCommand::Bench(_) => "measuring",
             CliCommand::Simulate(_) => "simulating",
             CliCommand::Analyze(_) => "analysing",
+            CliCommand::View(_) => "drawing",
             CliCommand::Export(_) => "exporting",
             CliCommand::Functions(_) | CliCommand::Explain(_) => "looking up",
         }
