@@ -20,7 +20,7 @@ pub(crate) struct ChartLine {
     pub name: String,
     /// Index into the columns of the run.
     pub column: usize,
-    /// Which colour: that of the joint, if it belongs to one.
+    /// Which colour: that of the joint, if it is the only line of one.
     pub colour: usize,
 }
 
@@ -37,11 +37,22 @@ pub(crate) struct ViewArrow {
 }
 
 /// How columns begin, what they are, and which of the units of a joint's coordinate they have (`JOINT_UNITS`), or their own.
-struct Kind {
+struct ColumnKind {
     prefix: &'static str,
     title: &'static str,
     unit: ColumnUnit,
     open: bool,
+}
+
+impl ColumnKind {
+    /// Forces that turn are torques.
+    fn title_of(&self, measure: Measure) -> &'static str {
+        match (self.prefix, measure) {
+            ("tau", Measure::Angle) => "Joint torques",
+            ("residual", Measure::Angle) => "Residual torques",
+            _ => self.title,
+        }
+    }
 }
 
 #[derive(Clone, Copy)]
@@ -51,15 +62,15 @@ enum ColumnUnit {
     Own(&'static str),
 }
 
-const fn kind(prefix: &'static str, title: &'static str, unit: ColumnUnit, open: bool) -> Kind {
-    Kind { prefix, title, unit, open }
+const fn kind(prefix: &'static str, title: &'static str, unit: ColumnUnit, open: bool) -> ColumnKind {
+    ColumnKind { prefix, title, unit, open }
 }
 
 /// Columns that `simulate`, `analyze` and `residuals` write, in the order in which they are plotted.
-const KINDS: [Kind; 16] = [
+const KINDS: [ColumnKind; 16] = [
     kind("q", "Coordinates", ColumnUnit::OfJoint(0), true),
-    kind("tau", "Forces of the joints", ColumnUnit::OfJoint(3), true),
-    kind("residual", "Residuals", ColumnUnit::OfJoint(3), true),
+    kind("tau", "Joint forces", ColumnUnit::OfJoint(3), true),
+    kind("residual", "Residual forces", ColumnUnit::OfJoint(3), true),
     kind("error", "Errors of tracking", ColumnUnit::OfJoint(0), true),
     kind("F", "Reactions", ColumnUnit::Own("N or N·m"), true),
     kind("s", "Distances", ColumnUnit::Own("m"), false),
@@ -146,14 +157,14 @@ fn known_place(model: &Model<f64>, order: usize, rest: &str) -> ColumnPlace {
     };
     let joint = joint_of(model, rest, entries);
     let (title, unit, open) = match (kind.unit, joint) {
-        (ColumnUnit::OfJoint(n), Some((_, Some(measure)))) => (kind.title, measure.units()[n], kind.open),
+        (ColumnUnit::OfJoint(n), Some((_, Some(measure)))) => (kind.title_of(measure), measure.units()[n], kind.open),
         (ColumnUnit::OfJoint(0), Some((_, None))) => ("Orientations, as quaternions", "", false),
         (ColumnUnit::OfJoint(_), _) => (kind.title, "", kind.open),
         (ColumnUnit::Own(unit), _) => (kind.title, unit, kind.open),
     };
-    // `force.elbow.x` has the colour of the elbow
-    let joint = joint.or_else(|| rest.rsplit_once('.').and_then(|(name, _)| joint_of(model, name, 0)));
-    ColumnPlace { title, unit, order, open, name: rest.to_string(), joint: joint.map(|(k, _)| k) }
+    // several lines of one joint need several colours
+    let joint = joint.map(|(k, _)| k).filter(|k| model.tree_joints()[*k].kind.is_single());
+    ColumnPlace { title, unit, order, open, name: rest.to_string(), joint }
 }
 
 /// The plots of these columns, in a fixed order. Every column is in one.

@@ -5,7 +5,7 @@
 
 use crate::charts::{arrows, charts, ViewArrow, ViewChart};
 use crate::ellipsoid::inertia_ellipsoid;
-use crate::poses::{world_poses, BodyPose};
+use crate::poses::{world_poses, ViewedPose};
 use crate::run::{ViewFailure, ViewedRun};
 use crate::solids::{extent, limbs, reach, Limb};
 use base64::{engine::general_purpose::STANDARD, Engine};
@@ -146,12 +146,17 @@ pub fn page(model: &Model<f64>, run: &ViewedRun, facts: &[(&str, String)]) -> Re
     ))
 }
 
+/// How many rows a page shows at most, of so many bodies and columns.
+pub(crate) fn most_rows(bodies: usize, columns: usize) -> usize {
+    // three bytes are four characters; a time is a number of 8 bytes
+    let bytes = (4 * (7 * bodies + columns) + 8) * 4 / 3;
+    (MOST_BYTES / bytes).clamp(FEWEST_ROWS, MOST_ROWS)
+}
+
 /// The rows that are shown: all, or so many that the page stays small, in equal steps of time as near as there are rows.
 fn shown_rows(model: &Model<f64>, run: &ViewedRun) -> Vec<usize> {
     let rows = run.times.len();
-    // three bytes are four characters; a time is a number of 8 bytes
-    let bytes = (4 * (7 * model.bodies.len() + run.columns.len()) + 8) * 4 / 3;
-    let most = (MOST_BYTES / bytes).clamp(FEWEST_ROWS, MOST_ROWS);
+    let most = most_rows(model.bodies.len(), run.columns.len());
     if rows <= most {
         return (0..rows).collect();
     }
@@ -222,14 +227,14 @@ fn bodies<'a>(model: &'a Model<f64>, limbs: &[Limb]) -> Vec<PageBody<'a>> {
             turn: single(e.turn),
             semi_axes: single(e.semi_axes),
         }),
-        link_turn: single(BodyPose::from(&body.link_frame).turn),
+        link_turn: single(ViewedPose::from(&body.link_frame).turn),
     };
     model.bodies.iter().zip(limbs).map(of).collect()
 }
 
 /// The robot's frames, or where it names none those of its joints.
 fn frames(model: &Model<f64>) -> Vec<PageFrame<'_>> {
-    let pose = |of: &Transform<f64>| BodyPose::from(of).in_single_precision();
+    let pose = |of: &Transform<f64>| ViewedPose::from(of).in_single_precision();
     if model.frames.is_empty() {
         let of = |(k, body): (usize, &'_ Body<f64>)| (k, pose(&body.link_frame));
         let frames = model.bodies.iter().enumerate().map(of).zip(&model.bodies);
@@ -253,26 +258,23 @@ fn directions(gravity: Vec3<f64>) -> [Vec3<f64>; 3] {
 fn camera(model: &Model<f64>, run: &ViewedRun, rows: &[usize], limbs: &[Limb]) -> (Camera, f64) {
     let axes = directions(model.gravity);
     let along = |p: Vec3<f64>| axes.map(|axis| axis.dot(p));
-    let (mut least, mut most) = ([f64::INFINITY; 3], [f64::NEG_INFINITY; 3]);
-    let mut lowest = f64::INFINITY;
     let first = extent(model, limbs, &run.configurations[rows[0]]);
+    let mut lowest = f64::INFINITY;
+    let mut seen: Vec<[f64; 3]> = Vec::new();
     for row in rows {
         let points = extent(model, limbs, &run.configurations[*row]);
         // the picture follows what floats
         let moved = if model.floats() { along(points[0] - first[0]) } else { [0.0; 3] };
-        for point in &points {
-            let point = along(*point);
+        for point in points.into_iter().map(along) {
             lowest = lowest.min(point[2]);
-            for k in 0..3 {
-                least[k] = least[k].min(point[k] - moved[k]);
-                most[k] = most[k].max(point[k] - moved[k]);
-            }
+            seen.push([0, 1, 2].map(|k| point[k] - moved[k]));
         }
     }
     let thick = limbs.iter().map(|limb| limb.radius).fold(0.0, f64::max);
-    let middle = [0, 1, 2].map(|k| (least[k] + most[k]) / 2.0);
-    let half = [0, 1, 2].map(|k| (most[k] - least[k]) / 2.0 + thick);
-    let radius = half.iter().map(|x| x * x).sum::<f64>().sqrt();
+    let ends = |k: usize, start: f64, f: fn(f64, f64) -> f64| seen.iter().map(|point| point[k]).fold(start, f);
+    let middle = [0, 1, 2].map(|k| (ends(k, f64::INFINITY, f64::min) + ends(k, f64::NEG_INFINITY, f64::max)) / 2.0);
+    let squares = seen.iter().map(|point| (0..3).map(|k| (point[k] - middle[k]) * (point[k] - middle[k])).sum::<f64>());
+    let radius = squares.fold(0.0, f64::max).sqrt() + 2.0 * thick;
     let target = axes.iter().zip(middle).fold(Vec3::zero(), |sum, (axis, x)| sum + axis.scale(x));
     // a fixed base stands on the ground, unless the robot hangs below it
     let thinnest = limbs.iter().map(|limb| limb.radius).fold(thick, f64::min);

@@ -44,5 +44,5 @@ mod solids;
 mod tour;
 
 pub use html::{page, FIELD_OF_VIEW};
-pub use poses::{world_poses, BodyPose};
+pub use poses::{world_poses, ViewedPose};
 pub use run::{ViewFailure, ViewedRun};

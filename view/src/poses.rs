@@ -7,20 +7,20 @@ use straightline_core::spatial::{Mat3, Transform};
 
 /// Pose of a frame.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct BodyPose {
+pub struct ViewedPose {
     /// Its origin \[m\].
     pub position: [f64; 3],
     /// Its axes: unit quaternion x, y, z, w.
     pub turn: [f64; 4],
 }
 
-impl From<&Transform<f64>> for BodyPose {
-    fn from(of: &Transform<f64>) -> BodyPose {
-        BodyPose { position: of.translation.to_array(), turn: quaternion(&of.rotation) }
+impl From<&Transform<f64>> for ViewedPose {
+    fn from(of: &Transform<f64>) -> ViewedPose {
+        ViewedPose { position: of.translation.to_array(), turn: quaternion(&of.rotation) }
     }
 }
 
-impl BodyPose {
+impl ViewedPose {
     /// Position and quaternion, rounded.
     pub fn in_single_precision(&self) -> [f32; 7] {
         let ([x, y, z], [i, j, k, w]) = (self.position, self.turn);
@@ -43,6 +43,6 @@ pub(crate) fn world_transforms(model: &Model<f64>, q: &[f64]) -> Vec<Transform<f
 }
 
 /// Poses in the world of the canonical frames of all bodies, at these coordinates (`model.nq()` of them).
-pub fn world_poses(model: &Model<f64>, q: &[f64]) -> Vec<BodyPose> {
-    world_transforms(model, q).iter().map(BodyPose::from).collect()
+pub fn world_poses(model: &Model<f64>, q: &[f64]) -> Vec<ViewedPose> {
+    world_transforms(model, q).iter().map(ViewedPose::from).collect()
 }

@@ -1,5 +1,6 @@
 //! What is shown of a robot without a run: each joint goes through its range, one after the other.
 
+use crate::html::most_rows;
 use crate::run::{entry_names, is_closed, neutral, ViewedRun};
 use crate::solids::reach;
 use straightline_core::algorithms::integrate;
@@ -14,8 +15,9 @@ const FARTHEST_TURN: f64 = std::f64::consts::TAU;
 const SLIDE: f64 = 0.15;
 /// Time that a coordinate takes \[s\].
 const DURATION: f64 = 2.0;
-/// Rows that a coordinate takes.
-const ROWS: usize = 42;
+/// Rows that a coordinate takes: between these, so that a page shows all of them if it can. Multiples of
+/// three, so that limits are among them.
+const ROWS: [usize; 2] = [6, 42];
 
 impl ViewedRun {
     /// A motion through the range of each joint in turn: from where it stands to its upper limit, to its lower one, and back; without limits a
@@ -25,6 +27,8 @@ impl ViewedRun {
         let mut run = ViewedRun { times: vec![0.0], configurations: vec![start.clone()], ..Default::default() };
         let size = reach(model, &start);
         let slide = SLIDE * size;
+        let coordinates = model.nv().max(1);
+        let rows = ((most_rows(model.bodies.len(), model.nq()) - 1) / coordinates).clamp(ROWS[0], ROWS[1]) / 3 * 3;
         for joint in model.independent_joints().filter(|joint| !joint.kind.is_base()) {
             for (k, measure) in joint.kind.row().measures.iter().enumerate() {
                 let (free, most) = match measure {
@@ -32,7 +36,7 @@ impl ViewedRun {
                     Measure::Length => (slide, size),
                 };
                 let range = range(joint, &start, free).map(|end| end.clamp(-most, most));
-                through(model, &mut run, &start, (joint.iv + k, range));
+                through(model, &mut run, rows, (joint.iv + k, range));
             }
         }
         let joints = model.joints();
@@ -59,22 +63,23 @@ fn range(joint: &Joint, start: &[f64], free: f64) -> [f64; 2] {
     [to(joint.limits.lower, -free), to(joint.limits.upper, free)]
 }
 
-/// One velocity coordinate goes up, down and back.
-fn through(model: &Model<f64>, run: &mut ViewedRun, start: &[f64], (k, [lower, upper]): (usize, [f64; 2])) {
+/// One velocity coordinate goes up, down and back, from where the run began.
+fn through(model: &Model<f64>, run: &mut ViewedRun, rows: usize, (k, [lower, upper]): (usize, [f64; 2])) {
+    let start = run.configurations[0].clone();
     let began = *run.times.last().expect("there is a first row");
     let corners = [0.0, upper, lower, 0.0];
-    let mut before = start.to_vec();
-    for row in 1..=ROWS {
-        let way = 3.0 * row as f64 / ROWS as f64;
+    let mut before = start.clone();
+    for row in 1..=rows {
+        let way = 3.0 * row as f64 / rows as f64;
         let leg = (way as usize).min(2);
         let s = way - leg as f64;
         // rests at every corner: s² (3 − 2 s)
         let moved = corners[leg] + (corners[leg + 1] - corners[leg]) * s * s * (3.0 - 2.0 * s);
         let mut step = vec![0.0; model.nv()];
         step[k] = moved;
-        let q = configuration(model, start, &before, &step).unwrap_or_else(|| before.clone());
+        let q = configuration(model, &start, &before, &step).unwrap_or_else(|| before.clone());
         before.clone_from(&q);
-        run.times.push(began + DURATION * row as f64 / ROWS as f64);
+        run.times.push(began + DURATION * row as f64 / rows as f64);
         run.configurations.push(q);
     }
 }

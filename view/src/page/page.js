@@ -88,7 +88,7 @@ function readColours() {
     const rgb = [(value >> 16) / 255, ((value >> 8) & 255) / 255, (value & 255) / 255];
     return alpha === undefined ? rgb : [...rgb, alpha];
   };
-  paint = { stage: of("--stage"), body: of("--body", 1), fixed: of("--fixed", 1), glass: of("--glass", 0.34), grid: of("--grid", 1), shadow: of("--shade", 0.22) };
+  paint = { stage: of("--stage"), body: of("--body", 1), fixed: of("--fixed", 1), glass: of("--glass", 0.26), grid: of("--grid", 1), shadow: of("--shade", 0.22) };
   paint.joints = Array.from({ length: COLOURS }, (_, k) => of(`--c${k}`, 1));
   paint.axes = ["--x", "--y", "--z"].map((name) => of(name, 1));
   paint.arrows = ["--a0", "--a1", "--a2", "--a3", "--a4", "--a5"].map((name) => of(name, 1));

@@ -150,11 +150,12 @@ fn the_first_pose_is_drawn_where_a_pinhole_camera_sees_it() {
     let joints = origins(&model, &run);
     let [[x0, y0], [x1, y1]] = [joints[1], joints[2]].map(|origin| projected(&page, origin, stage));
     assert!((x1 - x0).hypot(y1 - y0) > 60.0, "the upper arm is long enough to be looked at");
-    // the shoulder is orange, the slide green, the capsule between them neither; the colour of the background is not far from it
-    let [red, _, blue] = seen.pixel(x0, y0);
-    assert!(red > blue + 60, "shoulder: {:?}", seen.pixel(x0, y0));
-    let [red, green, _] = seen.pixel(x1, y1);
-    assert!(green > red + 30, "slide: {:?}", seen.pixel(x1, y1));
+    // the shoulder is orange, the ball of the hand red, the capsule between shoulder and slide neither
+    let [red, green, blue] = seen.pixel(x0, y0);
+    assert!(red > blue + 60 && red > green + 20, "shoulder: {:?}", seen.pixel(x0, y0));
+    let [x, y] = projected(&page, joints[3], stage);
+    let [red, green, blue] = seen.pixel(x, y);
+    assert!(red > blue + 60 && red > green + 60, "hand: {:?}", seen.pixel(x, y));
     let (x, y) = (0.5 * (x0 + x1), 0.5 * (y0 + y1));
     let pixel = seen.pixel(x, y);
     let spread = pixel.iter().max().unwrap() - pixel.iter().min().unwrap();

@@ -56,13 +56,14 @@ pub fn robot(name: &str, bodies: Vec<Body<f64>>, frames: Vec<Frame<f64>>) -> Mod
 
 /// Turns about a column, turns about a shoulder, slides along the upper arm, and a wrist that turns freely; a finger follows the shoulder.
 pub fn arm() -> Model<f64> {
-    let bodies = vec![
+    let mut bodies = vec![
         body("column", None, JointKind::Revolute, (0, 0), at(Mat3::identity(), 0.0, 0.1, 0.3)),
         body("upper", Some(0), JointKind::Revolute, (1, 1), at(across(), 0.05, 0.0, 0.2)),
         body("slide", Some(1), JointKind::Prismatic, (2, 2), at(across(), 0.4, 0.02, 0.0)),
         body("hand", Some(2), JointKind::Spherical, (3, 3), at(across(), 0.1, 0.0, 0.15)),
         body("finger", Some(3), JointKind::Revolute, (7, 6), at(Mat3::identity(), 0.12, 0.03, 0.0)),
     ];
+    (bodies[2].joint.limits.lower, bodies[2].joint.limits.upper) = (-0.1, 0.17);
     let tip = Frame { name: "tip".into(), body: Some(4), placement: at(across(), 0.1, 0.0, 0.02) };
     let mut arm = robot("arm", bodies, vec![tip]);
     arm.couplings = vec![Coupling { body: 4, source: 1, ratio: -0.5, offset: 0.2 }];
