@@ -7,6 +7,7 @@ use crate::charts::{arrows, charts, ViewArrow, ViewChart};
 use crate::ellipsoid::inertia_ellipsoid;
 use crate::poses::{world_poses, ViewedPose};
 use crate::run::{ViewFailure, ViewedRun};
+use crate::shapes::{ShapeForm, ViewedLook, ViewedShape};
 use crate::solids::{extent, limbs, reach, Limb};
 use base64::{engine::general_purpose::STANDARD, Engine};
 use serde::Serialize;
@@ -47,6 +48,7 @@ struct PageData<'a> {
     world: PageLimb,
     bodies: Vec<PageBody<'a>>,
     frames: Vec<PageFrame<'a>>,
+    shapes: Vec<PageShape>,
     charts: Vec<ViewChart>,
     arrows: Vec<ViewArrow>,
     rows: usize,
@@ -104,6 +106,19 @@ struct PageFrame<'a> {
     pose: [f32; 7],
 }
 
+#[derive(Serialize)]
+struct PageShape {
+    body: Option<usize>,
+    pose: [f32; 7],
+    /// "box", "cylinder", "sphere", or "mesh".
+    form: &'static str,
+    /// By what the unit solid is scaled along its axes.
+    size: [f32; 3],
+    colour: Option<[f32; 4]>,
+    /// Base64 of little-endian f32, nine per triangle; empty of other solids.
+    triangles: String,
+}
+
 fn single<const N: usize>(numbers: [f64; N]) -> [f32; N] {
     numbers.map(|x| x as f32)
 }
@@ -116,17 +131,36 @@ fn page_limb(limb: &Limb) -> PageLimb {
     PageLimb { ends: limb.ends.iter().map(|end| single(end.to_array())).collect(), radius: limb.radius as f32 }
 }
 
-/// The page of a robot's run: its whole text, the same bytes for the same input. `facts` stand below the title, each with its name.
+fn page_shape(shape: &ViewedShape) -> PageShape {
+    let (form, size, triangles) = match &shape.form {
+        ShapeForm::Box(edges) => ("box", *edges, String::new()),
+        ShapeForm::Cylinder { radius, length } => ("cylinder", [*radius, *radius, *length], String::new()),
+        ShapeForm::Sphere(radius) => ("sphere", [*radius; 3], String::new()),
+        ShapeForm::Mesh(triangles, scale) => ("mesh", *scale, encoded(triangles.iter().flatten().flatten().copied())),
+    };
+    let pose = ViewedPose::from(&shape.placement).in_single_precision();
+    PageShape { body: shape.body, pose, form, size: single(size), colour: shape.colour.map(single), triangles }
+}
+
+/// The page of a robot's run: its whole text, the same bytes for the same input. `facts` stand below the title, each with its
+/// name; a robot whose looks are not known is drawn by capsules.
 ///
 /// # Errors
 /// All that is wrong with the run: no row, numbers that are not finite, columns of other lengths, times that go back.
-pub fn page(model: &Model<f64>, run: &ViewedRun, facts: &[(&str, String)]) -> Result<String, Vec<ViewFailure>> {
+pub fn page(
+    model: &Model<f64>,
+    look: &ViewedLook,
+    run: &ViewedRun,
+    facts: &[(&str, String)],
+) -> Result<String, Vec<ViewFailure>> {
     let failures = run.check(model);
     if !failures.is_empty() {
         return Err(failures);
     }
     let rows = shown_rows(model, run);
-    let data = data(model, run, &rows, facts);
+    let mut data = data(model, run, &rows, facts);
+    data.shapes = look.shapes.iter().map(page_shape).collect();
+    data.notes.extend(look.notes.iter().cloned());
     let json = serde_json::to_string(&data).expect("it holds texts and numbers only");
     // JSON has these characters in texts alone, where they can be written so; no text ends the element then
     let json = json.replace('<', "\\u003c").replace('>', "\\u003e").replace('&', "\\u0026");
@@ -199,6 +233,7 @@ fn data<'a>(model: &'a Model<f64>, run: &ViewedRun, rows: &[usize], facts: &'a [
         world: page_limb(&limbs[0]),
         bodies: bodies(model, &limbs[1..]),
         frames: frames(model),
+        shapes: Vec::new(),
         charts: charts(model, &run.columns),
         arrows: arrows(model, &run.columns),
         rows: rows.len(),

@@ -11,7 +11,7 @@ use straightline_core::model::Model;
 use straightline_simulation::analysis::analyze;
 use straightline_simulation::html::four_digits;
 use straightline_simulation::table::DataTable;
-use straightline_view::{page, ViewFailure, ViewedRun};
+use straightline_view::{page, urdf_look, ViewFailure, ViewedLook, ViewedRun};
 
 /// Time between instants of a motion that is analysed, at most \[s\].
 const INTERVAL: f64 = 0.01;
@@ -51,8 +51,25 @@ pub fn view(a: &ViewArguments) -> Result<(), CommandFailure> {
         facts.push(("Duration", format!("{} s", four_digits(last - first))));
     }
     facts.push(("Drawn by", format!("straightline {}", straightline_codegen::VERSION)));
-    let page = page(&model, &run, &facts).map_err(|failures| refused(a.run.as_deref(), &failures))?;
+    let look = look(&a.robot, &model)?;
+    let page = page(&model, &look, &run, &facts).map_err(|failures| refused(a.run.as_deref(), &failures))?;
     files::write(&a.output, &page)
+}
+
+/// What a URDF says of the robot's looks. Meshes are looked for beside the robot file, and in the packages whose folders it lies in.
+fn look(robot: &Path, model: &Model<f64>) -> Result<ViewedLook, CommandFailure> {
+    let source = files::read(robot)?;
+    let whole = std::path::absolute(robot)?;
+    let folder = whole.parent().unwrap_or(Path::new(""));
+    let read = |name: &str| {
+        let inside =
+            ["package://", "model://", "file://"].iter().find_map(|scheme| name.strip_prefix(scheme)).unwrap_or(name);
+        let of_package = inside.split_once('/').map_or("", |(_, rest)| rest);
+        let places = folder.ancestors().flat_map(|at| [at.join(inside), at.join(of_package)]);
+        let found = places.filter(|path| path.is_file()).find_map(|path| std::fs::read(path).ok());
+        found.ok_or_else(|| "there is no such file at the robot file or above it".to_string())
+    };
+    Ok(urdf_look(source.text(), model, &read))
 }
 
 /// The columns of a file.

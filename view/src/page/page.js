@@ -71,7 +71,8 @@ for (const arrow of DATA.arrows) {
   known.most = Math.max(known.most, most);
   groups.set(arrow.group, known);
 }
-layer("capsules", true);
+if (DATA.shapes.length) layer("shapes", true);
+layer("capsules", !DATA.shapes.length);
 layer("ellipsoids", true, "inertia ellipsoids");
 layer("frames", false);
 layer("names", false);
@@ -132,6 +133,16 @@ function solidsAt(row) {
     DATA.bodies.forEach((body, k) => {
       capsules(solid, body.limb, poses[k], paint.body);
       joint(solid, body, poses[k]);
+    });
+  }
+  if (layers.get("shapes")) {
+    DATA.shapes.forEach(({ body, pose: p, form, size, colour }, k) => {
+      const own = { at: p.slice(0, 3), turn: p.slice(3) };
+      let pose = body === null ? own : compose(poses[body], own);
+      if (form === "cylinder") pose = compose(pose, { at: [0, 0, -size[2] / 2], turn: [0, 0, 0, 1] });
+      const mesh = { cylinder: "rod", mesh: `shape ${k}` }[form] || form;
+      const item = { mesh, pose, size, colour: colour || paint.body, turnable: true };
+      (item.colour[3] < 1 ? glass : solid).push(item);
     });
   }
   if (layers.get("ellipsoids")) {
@@ -348,7 +359,11 @@ function begin() {
     redraw();
   });
   try {
-    drawing = renderer(canvas);
+    const meshes = {};
+    DATA.shapes.forEach(({ form, triangles }, k) => {
+      if (form === "mesh") meshes[`shape ${k}`] = plane(new Float32Array(bytes(triangles)));
+    });
+    drawing = renderer(canvas, meshes);
     if (!drawing) problem("This browser has no WebGL2, which draws the robot; the plots need none.");
   } catch (error) {
     problem(`The robot cannot be drawn: ${error.message}`);

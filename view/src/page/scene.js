@@ -18,10 +18,12 @@ precision highp float;
 uniform vec4 colour;
 uniform vec3 eye, up, light;
 uniform float flatness;
+uniform bool turnable;
 in vec3 at, side;
 out vec4 seen;
 void main() {
   vec3 n = normalize(side), v = normalize(eye - at);
+  if (dot(n, v) < 0.0 && turnable) n = -n;
   float sun = max(dot(n, light), 0.0), sky = 0.5 + 0.5 * dot(n, up);
   float shine = pow(max(dot(n, normalize(light + v)), 0.0), 48.0);
   float rim = pow(1.0 - max(dot(n, v), 0.0), 3.0);
@@ -76,6 +78,29 @@ function arc(from, to, steps, far) {
     return [Math.cos(angle), Math.sin(angle), Math.cos(angle), Math.sin(angle), far];
   });
 }
+function box() {
+  const numbers = [];
+  for (let k = 0; k < 3; k++) for (const side of [-0.5, 0.5]) {
+    for (const [u, v] of [[-0.5, -0.5], [0.5, -0.5], [0.5, 0.5], [-0.5, -0.5], [0.5, 0.5], [-0.5, 0.5]]) {
+      const point = [0, 0, 0];
+      const normal = [0, 0, 0];
+      [point[k], point[(k + 1) % 3], point[(k + 2) % 3]] = [side, u, v];
+      normal[k] = 2 * side;
+      numbers.push(...point, ...normal, 0);
+    }
+  }
+  return numbers;
+}
+// Nine numbers per triangle, with the normals of their planes.
+function plane(triangles) {
+  const numbers = new Float32Array((triangles.length / 3) * 7);
+  for (let k = 0; k + 8 < triangles.length; k += 9) {
+    const [a, b, c] = [0, 3, 6].map((j) => [triangles[k + j], triangles[k + j + 1], triangles[k + j + 2]]);
+    const normal = unit(cross(less(b, a), less(c, a)));
+    [a, b, c].forEach((point, j) => numbers.set([...point, ...normal, 0], (k / 3 + j) * 7));
+  }
+  return numbers;
+}
 const QUARTER = Math.PI / 2;
 const MESHES = {
   sphere: lathe(arc(-QUARTER, QUARTER, 18, 0)),
@@ -83,6 +108,7 @@ const MESHES = {
   barrel: lathe([[0, -1, 0, -1], [0.9, -1, 0, -1], [0.9, -1, 0.5, -0.9], [1, -0.9, 0.9, -0.5], [1, -0.9, 1, 0], [1, 0.9, 1, 0], [1, 0.9, 0.9, 0.5], [0.9, 1, 0.5, 0.9], [0.9, 1, 0, 1], [0, 1, 0, 1]]),
   rod: lathe([[0, 0, 0, -1], [1, 0, 0, -1], [1, 0, 1, 0], [1, 1, 1, 0], [1, 1, 0, 1], [0, 1, 0, 1]]),
   cone: lathe([[0, 0, 0, -1], [1, 0, 0, -1], [1, 0, 0.9, 0.4], [0, 1, 0.9, 0.4]]),
+  box: box(),
   square: [[-1, -1], [1, -1], [1, 1], [-1, -1], [1, 1], [-1, 1]].flatMap(([x, y]) => [x, y, 0, 0, 0, 1, 0]),
 };
 
@@ -105,8 +131,8 @@ function program(gl, vertex, fragment) {
   return { made, names };
 }
 
-// What draws into a canvas; null without WebGL2.
-function renderer(canvas) {
+// What draws into a canvas, these meshes too; null without WebGL2.
+function renderer(canvas, more) {
   const gl = canvas.getContext("webgl2", { antialias: true, stencil: true, alpha: false, preserveDrawingBuffer: true });
   if (!gl) return null;
   let solid, ground, arrays;
@@ -114,7 +140,7 @@ function renderer(canvas) {
     solid = program(gl, SOLID_VERTEX, SOLID_FRAGMENT);
     ground = program(gl, GROUND_VERTEX, GROUND_FRAGMENT);
     arrays = {};
-    for (const [name, numbers] of Object.entries(MESHES)) {
+    for (const [name, numbers] of Object.entries({ ...MESHES, ...more })) {
       const array = gl.createVertexArray();
       gl.bindVertexArray(array);
       gl.bindBuffer(gl.ARRAY_BUFFER, gl.createBuffer());
@@ -140,6 +166,7 @@ function renderer(canvas) {
       gl.uniform3fv(solid.names.size, item.size);
       gl.uniform1f(solid.names.pull, item.pull || 0);
       gl.uniform4fv(solid.names.colour, colour || item.colour);
+      gl.uniform1i(solid.names.turnable, item.turnable ? 1 : 0);
       gl.drawArrays(gl.TRIANGLES, 0, mesh.count);
       vertices += mesh.count;
     }

@@ -5,3 +5,4 @@ mod ellipsoid;
 mod page;
 mod robots;
 mod run;
+mod shapes;

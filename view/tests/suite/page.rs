@@ -6,10 +6,10 @@ use serde_json::Value;
 use straightline_core::algorithms::forward_kinematics;
 use straightline_core::model::{Frame, Model};
 use straightline_core::spatial::Transform;
-use straightline_view::{page, ViewedRun};
+use straightline_view::{page, ViewedLook, ViewedRun};
 
 pub fn written(model: &Model<f64>, run: &ViewedRun) -> String {
-    page(model, run, &[("Robot file", "a.toml".to_string())]).unwrap()
+    page(model, &ViewedLook::default(), run, &[("Robot file", "a.toml".to_string())]).unwrap()
 }
 
 /// What a browser takes for the text of the first element that begins so.
@@ -178,9 +178,9 @@ fn columns_are_plotted_by_what_they_are_and_measured_in() {
 
 #[test]
 fn a_run_of_another_robot_is_refused() {
-    let failures = page(&arm(), &ViewedRun::tour(&hostile()), &[]).unwrap_err();
+    let failures = page(&arm(), &ViewedLook::default(), &ViewedRun::tour(&hostile()), &[]).unwrap_err();
     assert!(failures.iter().any(|failure| failure.what.contains("7 coordinates")), "{failures:?}");
-    let failures = page(&arm(), &ViewedRun::default(), &[]).unwrap_err();
+    let failures = page(&arm(), &ViewedLook::default(), &ViewedRun::default(), &[]).unwrap_err();
     assert!(failures[0].what.contains("no row"), "{failures:?}");
 }
 
