@@ -5,7 +5,7 @@
 
 use crate::charts::{arrows, charts, ViewArrow, ViewChart};
 use crate::ellipsoid::inertia_ellipsoid;
-use crate::poses::{world_poses, ViewedPose};
+use crate::poses::{world_poses, world_transforms, ViewedPose};
 use crate::run::{ViewFailure, ViewedRun};
 use crate::shapes::{ShapeForm, ViewedLook, ViewedShape};
 use crate::solids::{extent, limbs, reach, Limb};
@@ -44,7 +44,8 @@ struct PageData<'a> {
     ground: f32,
     /// How far the robot reaches \[m\].
     reach: f32,
-    floats: bool,
+    /// The body that floats.
+    base: Option<usize>,
     world: PageLimb,
     bodies: Vec<PageBody<'a>>,
     frames: Vec<PageFrame<'a>>,
@@ -229,7 +230,7 @@ fn data<'a>(model: &'a Model<f64>, run: &ViewedRun, rows: &[usize], facts: &'a [
         camera,
         ground: ground as f32,
         reach: reach as f32,
-        floats: model.floats(),
+        base: base(model),
         world: page_limb(&limbs[0]),
         bodies: bodies(model, &limbs[1..]),
         frames: frames(model),
@@ -279,6 +280,11 @@ fn frames(model: &Model<f64>) -> Vec<PageFrame<'_>> {
     frames.map(|frame| PageFrame { name: &frame.name, body: frame.body, pose: pose(&frame.placement) }).collect()
 }
 
+/// The body of a floating base.
+fn base(model: &Model<f64>) -> Option<usize> {
+    model.bodies.iter().position(|body| body.joint.kind.is_base())
+}
+
 /// Directions of the world as the page has them: the axis that gravity points against most is up, and z without gravity.
 fn directions(gravity: Vec3<f64>) -> [Vec3<f64>; 3] {
     let up = gravity.to_array().map(|x| -x);
@@ -293,13 +299,14 @@ fn directions(gravity: Vec3<f64>) -> [Vec3<f64>; 3] {
 fn camera(model: &Model<f64>, run: &ViewedRun, rows: &[usize], limbs: &[Limb]) -> (Camera, f64) {
     let axes = directions(model.gravity);
     let along = |p: Vec3<f64>| axes.map(|axis| axis.dot(p));
-    let first = extent(model, limbs, &run.configurations[rows[0]]);
+    let base_at = |row: usize| base(model).map(|b| world_transforms(model, &run.configurations[row])[b].translation);
+    let first = base_at(rows[0]);
     let mut lowest = f64::INFINITY;
     let mut seen: Vec<[f64; 3]> = Vec::new();
     for row in rows {
         let points = extent(model, limbs, &run.configurations[*row]);
         // the picture follows what floats
-        let moved = if model.floats() { along(points[0] - first[0]) } else { [0.0; 3] };
+        let moved = base_at(*row).zip(first).map_or([0.0; 3], |(now, first)| along(now - first));
         for point in points.into_iter().map(along) {
             lowest = lowest.min(point[2]);
             seen.push([0, 1, 2].map(|k| point[k] - moved[k]));
@@ -331,7 +338,7 @@ fn camera(model: &Model<f64>, run: &ViewedRun, rows: &[usize], limbs: &[Limb]) -
 
 /// From the first to the second horizontal direction \[rad\]: in front of what moves in a plane, else from the side.
 fn azimuth(model: &Model<f64>, run: &ViewedRun, axes: [Vec3<f64>; 3]) -> f64 {
-    let poses = crate::poses::world_transforms(model, &run.configurations[0]);
+    let poses = world_transforms(model, &run.configurations[0]);
     let turning = model.bodies.iter().zip(&poses).filter(|(body, _)| body.joint.kind.turns());
     let mut turning = turning.map(|(_, pose)| Mat3::column(&pose.rotation, 2));
     let aside = 0.35;

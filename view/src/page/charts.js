@@ -13,11 +13,11 @@ function element(name, className, text) {
   return node;
 }
 
-// 1, 2 or 5 times a power of ten, near so many steps.
+// 1, 2, 2.5 or 5 times a power of ten, in about so many steps.
 function step(range, count) {
   const rough = range / count || 1;
   const power = 10 ** Math.floor(Math.log10(rough));
-  return power * ([1, 2, 5].find((k) => k * power >= rough) || 10);
+  return power * ([1, 2, 2.5, 5].find((k) => k * power >= rough) || 10);
 }
 function ticks(from, to, count) {
   const by = step(to - from, count);
@@ -84,7 +84,7 @@ function chart(of, { times, columns, seek }) {
     y = (v) => HEIGHT - EDGE.bottom - ((v - low) / (high - low)) * (HEIGHT - EDGE.top - EDGE.bottom);
     svg.setAttribute("viewBox", `0 0 ${width} ${HEIGHT}`);
     svg.replaceChildren();
-    for (const v of ticks(low, high, 4)) {
+    for (const v of ticks(low, high, 5)) {
       const at = y(v).toFixed(1);
       svg.append(made("path", { class: "grid", d: `M${EDGE.left} ${at}H${width - EDGE.right}` }));
       svg.append(made("text", { x: EDGE.left - 6, y: Number(at) + 4, "text-anchor": "end" }, written(v, 4)));

@@ -77,7 +77,7 @@ layer("ellipsoids", true, "inertia ellipsoids");
 layer("frames", false);
 layer("names", false);
 layer("ground", true);
-if (DATA.floats) layer("follow", true, "follow the base");
+if (DATA.base !== null) layer("follow", true, "follow the base");
 for (const [name, { most, unit: measured }] of groups) layer(name, /residual|forces carried|joint torques/.test(name), `${name}, at most ${written(most, 3)} ${measured}`);
 
 // Colours are those of the style, so that they follow the theme.
@@ -126,7 +126,7 @@ function solidsAt(row) {
   const [solid, glass, above] = [[], [], []];
   if (layers.get("capsules")) {
     capsules(solid, DATA.world, STILL, paint.fixed);
-    if (!DATA.floats) {
+    if (DATA.base === null) {
       const up = { at: [0, 0, 0], turn: towards(CAMERA.axes[2]) };
       solid.push({ mesh: "barrel", pose: up, size: [1.9 * DATA.world.radius, 1.9 * DATA.world.radius, 0.35 * DATA.world.radius], colour: paint.fixed });
     }
@@ -180,7 +180,7 @@ function lookout(poses) {
   const back = add(add(scaled(a, out[0]), scaled(b, out[1])), scaled(up, out[2]));
   let target = camera.target;
   if (layers.get("follow")) {
-    const moved = less(poses[0].at, stored(0, 0).at);
+    const moved = less(poses[DATA.base].at, stored(0, DATA.base).at);
     target = add(target, less(moved, scaled(up, dot(moved, up))));
   }
   const eye = add(target, scaled(back, distance));

@@ -90,7 +90,7 @@ fn without_a_run_joints_move_in_turn_and_a_base_may_float() {
     let (text, data) = page(&html);
     assert!(
         text.len() < 400_000
-            && data["floats"] == true
+            && data["base"] == 0
             && data["notes"][0].as_str().unwrap().starts_with("No run was given")
     );
     assert!(data["facts"].to_string().contains("solo12.urdf"), "{}", data["facts"]);
