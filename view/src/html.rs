@@ -85,6 +85,8 @@ struct PageBody<'a> {
     joint: &'a str,
     /// What stands for the joint: "turn", "slide", "ball" or "base".
     kind: &'static str,
+    /// Where the joint stands in the parent \[m\].
+    home: [f32; 3],
     /// Index of the joint's colour.
     colour: usize,
     limb: PageLimb,
@@ -256,6 +258,7 @@ fn bodies<'a>(model: &'a Model<f64>, limbs: &[Limb]) -> Vec<PageBody<'a>> {
             kind if kind.row().has_axis => "turn",
             _ => "ball",
         },
+        home: single(body.placement.translation.to_array()),
         colour: order.iter().position(|name| *name == body.joint.name).unwrap_or(0),
         limb: page_limb(limb),
         ellipsoid: inertia_ellipsoid(body).map(|e| PageEllipsoid {
@@ -316,7 +319,7 @@ fn camera(model: &Model<f64>, run: &ViewedRun, rows: &[usize], limbs: &[Limb]) -
     let ends = |k: usize, start: f64, f: fn(f64, f64) -> f64| seen.iter().map(|point| point[k]).fold(start, f);
     let middle = [0, 1, 2].map(|k| (ends(k, f64::INFINITY, f64::min) + ends(k, f64::NEG_INFINITY, f64::max)) / 2.0);
     let squares = seen.iter().map(|point| (0..3).map(|k| (point[k] - middle[k]) * (point[k] - middle[k])).sum::<f64>());
-    let radius = squares.fold(0.0, f64::max).sqrt() + 2.0 * thick;
+    let radius = squares.fold(0.0, f64::max).sqrt() + 3.0 * thick;
     let target = axes.iter().zip(middle).fold(Vec3::zero(), |sum, (axis, x)| sum + axis.scale(x));
     // a fixed base stands on the ground, unless the robot hangs below it
     let thinnest = limbs.iter().map(|limb| limb.radius).fold(thick, f64::min);

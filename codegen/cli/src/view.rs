@@ -74,8 +74,13 @@ fn look(robot: &Path, model: &Model<f64>) -> Result<ViewedLook, CommandFailure> 
 
 /// The columns of a file.
 fn of_file(path: &Path, model: &Model<f64>) -> Result<ViewedRun, CommandFailure> {
-    files::note(path);
-    let source = parquet::source(path, &path.display().to_string()).map_err(|why| unreadable(path, &why))?;
+    let source = match parquet::is_parquet(path) {
+        false => files::read(path)?,
+        true => {
+            files::note(path);
+            parquet::source(path, &path.display().to_string()).map_err(|why| unreadable(path, &why))?
+        }
+    };
     let mut diagnostics = Diagnostics::new();
     let columns = samples::table(&source, &mut diagnostics);
     print::diagnostics(&diagnostics, Severity::Warning);

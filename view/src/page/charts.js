@@ -27,8 +27,9 @@ function ticks(from, to, count) {
 function written(x, digits) {
   if (x === 0) return "0";
   const size = Math.abs(x);
-  const text = size >= 1e5 || size < 1e-3 ? x.toExponential(Math.max(0, digits - 2)) : String(Number(x.toPrecision(digits)));
-  return text.replace("-", "−").replace("e+", "e");
+  const rounded = Number(x.toPrecision(digits));
+  const text = size >= 1e5 || size < 1e-3 ? rounded.toExponential() : String(rounded);
+  return text.replaceAll("-", "−").replace("e+", "e");
 }
 
 const COLOURS = 10;

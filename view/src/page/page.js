@@ -102,8 +102,15 @@ function capsules(items, limb, pose, colour) {
     items.push({ mesh: "capsule", pose: compose(pose, own), size: [limb.radius, limb.radius, limb.radius], pull: length, colour });
   }
 }
-function joint(items, body, pose) {
+function joint(items, body, pose, parent) {
   const r = body.limb.radius;
+  // what slides away from where its joint stands is held by a rod
+  if (body.kind === "slide") {
+    const way = less(place(parent, body.home), pose.at);
+    const length = norm(way);
+    const own = { at: pose.at, turn: towards(scaled(way, 1 / (length || 1))) };
+    if (length > r) items.push({ mesh: "capsule", pose: own, size: [0.45 * r, 0.45 * r, 0.45 * r], pull: length, colour: paint.fixed });
+  }
   const colour = paint.joints[body.colour % COLOURS];
   if (body.kind === "turn") items.push({ mesh: "barrel", pose, size: [1.28 * r, 1.28 * r, 1.35 * r], colour });
   if (body.kind === "slide") items.push({ mesh: "barrel", pose, size: [0.72 * r, 0.72 * r, 2.6 * r], colour });
@@ -132,7 +139,7 @@ function solidsAt(row) {
     }
     DATA.bodies.forEach((body, k) => {
       capsules(solid, body.limb, poses[k], paint.body);
-      joint(solid, body, poses[k]);
+      joint(solid, body, poses[k], body.parent === null ? STILL : poses[body.parent]);
     });
   }
   if (layers.get("shapes")) {
