@@ -28,8 +28,8 @@ fn chromium() -> Option<PathBuf> {
     std::env::split_paths(&folders).flat_map(|folder| names.map(|name| folder.join(name))).find(|path| path.is_file())
 }
 
-/// Opens a page at this fragment; `None` where there is no browser.
-fn seen(name: &str, page: &str, fragment: &str, is_dark: bool) -> Option<Seen> {
+/// Opens a page at this fragment, with further arguments of the browser; `None` where there is no browser.
+fn seen(name: &str, page: &str, fragment: &str, is_dark: bool, more: &[&str]) -> Option<Seen> {
     let Some(browser) = chromium() else {
         eprintln!("skipped: Chromium is not installed");
         return None;
@@ -54,6 +54,7 @@ fn seen(name: &str, page: &str, fragment: &str, is_dark: bool) -> Option<Seen> {
             "--disable-component-update",
             "--disable-extensions",
         ])
+        .args(more)
         .arg(format!("--blink-settings=preferredColorScheme={}", if is_dark { 0 } else { 1 }))
         .arg(format!("--user-data-dir={}", here.join("profile").display()))
         .arg(format!("--screenshot={}", picture.display()))
@@ -142,7 +143,7 @@ fn the_first_pose_is_drawn_where_a_pinhole_camera_sees_it() {
     let model = arm();
     let run = ViewedRun::tour(&model);
     let page = written(&model, &run);
-    let Some(seen) = seen("arm", &page, "t=0&show=capsules", false) else { return };
+    let Some(seen) = seen("arm", &page, "t=0&show=capsules", false, &[]) else { return };
     seen.assert_nothing_is_wrong();
     assert_eq!(seen.attribute("time"), Some("0"));
     let stage = seen.stage(STAGE[0]);
@@ -176,7 +177,9 @@ fn hostile_names_are_text_and_nothing_leaves_the_page() {
     let address = listener.local_addr().unwrap();
     model.bodies[2].name = format!("</script><img src=//{address}/name><script>fetch('//{address}/script')</script>");
     let page = written(&model, &ViewedRun::tour(&model));
-    let Some(seen) = seen("hostile", &page, "t=0.3&show=capsules,ellipsoids,frames,names,ground", true) else { return };
+    let Some(seen) = seen("hostile", &page, "t=0.3&show=capsules,ellipsoids,frames,names,ground", true, &[]) else {
+        return;
+    };
     seen.assert_nothing_is_wrong();
     assert!(listener.accept().is_err(), "the page has asked for something");
     // as text of elements, and nowhere as elements
@@ -187,4 +190,20 @@ fn hostile_names_are_text_and_nothing_leaves_the_page() {
     // it is dark
     let stage = seen.stage(STAGE[1]);
     assert!(stage[2] > stage[0] + 500 && stage[3] > stage[1] + 300, "{stage:?}");
+}
+
+#[test]
+fn without_webgl_the_page_says_so_and_shows_its_plots() {
+    let model = arm();
+    let page = written(&model, &ViewedRun::tour(&model));
+    let Some(seen) = seen("plain", &page, "t=0.5", false, &["--disable-3d-apis"]) else { return };
+    assert!(
+        seen.attribute("problem").is_some_and(|problem| problem.contains("no WebGL2")),
+        "{:?}",
+        seen.attribute("problem")
+    );
+    assert_eq!(seen.attribute("vertices"), None);
+    // two plots are open, the one of the quaternion is not
+    assert_eq!(seen.document.matches("class=\"cursor\"").count(), 2);
+    assert!(seen.document.contains("0.500 s</output>"));
 }

@@ -121,3 +121,24 @@ fn a_run_of_another_robot_is_refused_with_all_that_is_missing() {
     let said = fails(&["view", &robot, &run.display().to_string(), "-o", &html]);
     assert!(said.contains("run.csv:3") && said.contains('x'), "{said}");
 }
+
+#[test]
+fn what_loops_determine_is_solved_for_where_the_run_leaves_it_out() {
+    let here = scratch("loops");
+    let robot = format!("{}/../tests/files/fourbar.toml", env!("CARGO_MANIFEST_DIR"));
+    let run = write(&here, "t,q.crank\n0,0\n0.2,0.4\n0.4,0.9\n0.6,1.3\n");
+    let html = here.join("page.html").display().to_string();
+    succeeds(&["view", &robot, &run, "-o", &html, "--quiet"]);
+    let solved = page(&html).1;
+    assert_eq!(solved["notes"][0], "What loops determine is not in the run: it was solved for.");
+    // a crank that goes too far in one row cannot take the others along
+    let run = write(&here, "t,q.crank\n0,0\n0.2,1e300\n");
+    let said = fails(&["view", &robot, &run, "-o", &html, "--quiet"]);
+    assert!(said.contains("at t = 0.2 s the loops of fourbar cannot be closed"), "{said}");
+}
+
+fn write(folder: &Path, text: &str) -> String {
+    let path = folder.join("run.csv");
+    fs::write(&path, text).unwrap();
+    path.display().to_string()
+}
