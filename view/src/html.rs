@@ -14,6 +14,7 @@ use serde::Serialize;
 use sha2::{Digest, Sha256};
 use straightline_core::model::{Body, Model};
 use straightline_core::spatial::{Mat3, Transform, Vec3};
+use straightline_core::trig::DOMAIN_F64;
 
 /// The angle between the upper and the lower edge of the picture \[rad\].
 pub const FIELD_OF_VIEW: f64 = 0.6;
@@ -149,7 +150,8 @@ fn page_shape(shape: &ViewedShape) -> PageShape {
 /// name; a robot whose looks are not known is drawn by capsules.
 ///
 /// # Errors
-/// All that is wrong with the run: no row, numbers that are not finite, columns of other lengths, times that go back.
+/// All that is wrong with the run: no row, numbers that are not finite, columns of other lengths, times that go back,
+/// angles and numbers that single precision does not hold.
 pub fn page(
     model: &Model<f64>,
     look: &ViewedLook,
@@ -161,6 +163,10 @@ pub fn page(
         return Err(failures);
     }
     let rows = shown_rows(model, run);
+    let failures = undrawable(model, run, &rows);
+    if !failures.is_empty() {
+        return Err(failures);
+    }
     let mut data = data(model, run, &rows, facts);
     data.shapes = look.shapes.iter().map(page_shape).collect();
     data.notes.extend(look.notes.iter().cloned());
@@ -181,6 +187,30 @@ pub fn page(
          <style>{STYLE}</style>\n</head>\n<body>\n{BODY}\
          <script type=\"application/json\" id=\"data\">{json}</script>\n<script>{SCRIPT}</script>\n</body>\n</html>\n"
     ))
+}
+
+/// What single precision does not hold: the first pose of such a body, and the first such number of each column.
+fn undrawable(model: &Model<f64>, run: &ViewedRun, rows: &[usize]) -> Vec<ViewFailure> {
+    let is_fine = |x: f64| (x as f32).is_finite();
+    let is_lost = |pose: &ViewedPose| !pose.in_single_precision().iter().all(|x| x.is_finite());
+    let lost = rows.iter().find_map(|row| {
+        let body = world_poses(model, &run.configurations[*row]).iter().position(is_lost)?;
+        Some((run.times[*row], &model.bodies[body]))
+    });
+    let mut failures: Vec<ViewFailure> = Vec::new();
+    if let Some((t, body)) = lost {
+        let what = format!("at t = {t:?} s the pose of {} is no number that can be drawn", body.name);
+        let help = format!("look at {}: angles stay within ±{DOMAIN_F64} rad", body.joint.name);
+        failures.push(ViewFailure { what, help });
+    }
+    for (name, column) in &run.columns {
+        if let Some(row) = rows.iter().find(|row| !is_fine(column[**row])) {
+            let what =
+                format!("at t = {:?} s `{name}` is {:e}, which cannot be plotted", run.times[*row], column[*row]);
+            failures.push(ViewFailure { what, help: format!("numbers stay within ±{:e}", f32::MAX) });
+        }
+    }
+    failures
 }
 
 /// How many rows a page shows at most, of so many bodies and columns.

@@ -191,3 +191,15 @@ fn up_is_against_gravity() {
     let camera = data(&written(&model, &ViewedRun::tour(&model)))["camera"].clone();
     assert_eq!(camera["axes"], serde_json::json!([[0.0, 0.0, 1.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]]));
 }
+
+#[test]
+fn what_single_precision_does_not_hold_is_refused() {
+    let model = arm();
+    let mut run = ViewedRun::tour(&model);
+    run.configurations[3][1] = 1e9;
+    run.columns[0].1[2] = 1e39;
+    let failures = page(&model, &ViewedLook::default(), &run, &[]).unwrap_err();
+    let said: Vec<String> = failures.iter().map(ToString::to_string).collect();
+    assert!(said.len() == 2 && said[0].contains("the pose of upper") && said[0].contains("to_upper"), "{said:?}");
+    assert!(said[1].contains("`q.to_column` is 1e39"), "{said:?}");
+}
