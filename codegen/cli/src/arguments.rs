@@ -1,4 +1,4 @@
-//! The command line, and what it says in the library's terms.
+//! The command line, and what it says in the library's terms: one file, so that all commands are seen together.
 
 use crate::convert::ConvertArguments;
 use crate::given::{possible, Given};
@@ -114,18 +114,6 @@ Examples:
 {EXIT_CODES}"))]
     Analyze(Analyze),
     /// Draw a robot in motion: a page for the browser, complete in one file
-    #[command(after_help = format!("\
-RUN is what `simulate` or `analyze` writes (CSV, JSON or Parquet): the columns q.JOINT move the robot, all columns are
-plotted, and forces and torques are drawn as arrows. A motion in TOML (codegen/SIMULATION.md) is analysed first.
-Without RUN each joint moves through its range in turn.
-
-Examples:
-  straightline view panda.urdf -o panda.html
-  straightline simulate panda.urdf --input swing.toml --output swing.csv && straightline view panda.urdf swing.csv -o swing.html
-  straightline view panda.urdf reach.toml -o reach.html
-  straightline view solo12.urdf --floating-base -o solo12.html
-
-{EXIT_CODES}"))]
     View(ViewArguments),
     /// Write a self-contained package for other languages
     #[command(after_help = format!("\

@@ -1,6 +1,6 @@
 //! The command `view`: a robot in motion as a page for the browser.
 
-use crate::arguments::{robot_file, ModelArgs};
+use crate::arguments::{robot_file, ModelArgs, EXIT_CODES};
 use crate::motion::{experiment, joined, not_analysed, robot, unreadable};
 use crate::{files, print, CommandFailure};
 use clap::Args;
@@ -18,6 +18,18 @@ const INTERVAL: f64 = 0.01;
 
 /// What `view` is told.
 #[derive(Debug, Args)]
+#[command(after_help = format!("\
+RUN is what `simulate` or `analyze` writes (CSV, JSON or Parquet): the columns q.JOINT move the robot, all columns are
+plotted, and forces and torques are drawn as arrows. A motion in TOML (codegen/SIMULATION.md) is analysed first.
+Without RUN each joint moves through its range in turn.
+
+Examples:
+  straightline view panda.urdf -o panda.html
+  straightline simulate panda.urdf --input swing.toml --output swing.csv && straightline view panda.urdf swing.csv -o swing.html
+  straightline view panda.urdf reach.toml -o reach.html
+  straightline view solo12.urdf --floating-base -o solo12.html
+
+{EXIT_CODES}"))]
 pub struct ViewArguments {
     #[arg(help = robot_file())]
     pub robot: PathBuf,
