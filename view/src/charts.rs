@@ -48,7 +48,7 @@ impl ColumnKind {
     /// Forces that turn are torques.
     fn title_of(&self, measure: Measure) -> &'static str {
         match (self.prefix, measure) {
-            ("tau", Measure::Angle) => "Joint torques",
+            ("tau" | "effort", Measure::Angle) => "Joint torques",
             ("residual", Measure::Angle) => "Residual torques",
             _ => self.title,
         }
@@ -67,10 +67,13 @@ const fn kind(prefix: &'static str, title: &'static str, unit: ColumnUnit, open:
 }
 
 /// Columns that `simulate`, `analyze` and `residuals` write, in the order in which they are plotted.
-const KINDS: [ColumnKind; 16] = [
+const KINDS: [ColumnKind; 19] = [
     kind("q", "Coordinates", ColumnUnit::OfJoint(0), true),
     kind("tau", "Joint forces", ColumnUnit::OfJoint(3), true),
+    kind("effort", "Joint forces", ColumnUnit::OfJoint(3), true),
     kind("residual", "Residual forces", ColumnUnit::OfJoint(3), true),
+    kind("unexplained", "Unexplained residuals", ColumnUnit::OfJoint(3), true),
+    kind("observer", "Residuals by the observer", ColumnUnit::OfJoint(3), false),
     kind("error", "Errors of tracking", ColumnUnit::OfJoint(0), true),
     kind("F", "Reactions", ColumnUnit::Own("N or N·m"), true),
     kind("s", "Distances", ColumnUnit::Own("m"), false),
@@ -198,9 +201,11 @@ pub(crate) fn arrows(model: &Model<f64>, columns: &[(String, Vec<f64>)]) -> Vec<
         }
         let Some(measure) = joint.kind.elementary() else { continue };
         let moment = measure == Measure::Angle;
-        for (prefix, groups) in
-            [("tau", ["joint torques", "joint forces"]), ("residual", ["residual torques", "residual forces"])]
-        {
+        for (prefix, groups) in [
+            ("tau", ["joint torques", "joint forces"]),
+            ("effort", ["joint torques", "joint forces"]),
+            ("residual", ["residual torques", "residual forces"]),
+        ] {
             if let Some(column) = find(format!("{prefix}.{name}")) {
                 found.push(ViewArrow { group: groups[usize::from(!moment)], body, moment, columns: vec![column] });
             }

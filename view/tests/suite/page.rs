@@ -138,6 +138,7 @@ fn columns_are_plotted_by_what_they_are_and_measured_in() {
         "force.to_column.y",
         "force.to_column.z",
         "residual.to_upper",
+        "effort.to_column",
         "energy",
         "weather",
         "moment.to_column.x",
@@ -160,7 +161,7 @@ fn columns_are_plotted_by_what_they_are_and_measured_in() {
             "Coordinates [rad]: to_column to_upper",
             "Coordinates [m]: to_slide",
             "Orientations, as quaternions []: to_hand.qx to_hand.qy to_hand.qz to_hand.qw",
-            "Joint torques [N·m]: to_upper",
+            "Joint torques [N·m]: to_upper to_column",
             "Joint forces [N]: to_slide",
             "Residual torques [N·m]: to_upper",
             "Velocities [rad/s]: to_hand.wx",
@@ -173,7 +174,7 @@ fn columns_are_plotted_by_what_they_are_and_measured_in() {
     let arrows: Vec<&str> =
         data["arrows"].as_array().unwrap().iter().map(|arrow| arrow["group"].as_str().unwrap()).collect();
     // a moment with one component is no arrow
-    assert_eq!(arrows, ["forces carried", "joint torques", "residual torques", "joint forces"]);
+    assert_eq!(arrows, ["forces carried", "joint torques", "joint torques", "residual torques", "joint forces"]);
 }
 
 #[test]
