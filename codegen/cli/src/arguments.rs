@@ -1,4 +1,4 @@
-//! The command line, and what it says in the library's terms.
+//! The command line, and what it says in the library's terms: one file, so that all commands are seen together.
 
 use crate::convert::ConvertArguments;
 use crate::given::{possible, Given};
@@ -15,7 +15,7 @@ use straightline_codegen::options::GivenOptions;
 use straightline_codegen::Function;
 
 pub use crate::bench::Bench;
-pub use crate::motion::{Analyze, Simulate};
+pub use crate::motion::{Analyze, Simulate, ViewArguments};
 
 pub const EXIT_CODES: &str = "\
 Exit codes:
@@ -113,6 +113,8 @@ Examples:
 
 {EXIT_CODES}"))]
     Analyze(Analyze),
+    /// Draw a robot in motion: a page for the browser, complete in one file
+    View(ViewArguments),
     /// Write a self-contained package for other languages
     #[command(after_help = format!("\
 With `--c-abi` the directory becomes a Rust package without dependencies; `cargo build --release` in it gives a shared
@@ -159,6 +161,7 @@ impl CliCommand {
             CliCommand::Bench(a) => &a.model,
             CliCommand::Simulate(a) => return a.model(),
             CliCommand::Analyze(a) => return a.model(),
+            CliCommand::View(a) => return a.model(),
             CliCommand::Export(a) => &a.model,
             CliCommand::Convert(_) | CliCommand::Functions(_) | CliCommand::Explain(_) => return None,
         })
@@ -183,6 +186,7 @@ impl CliCommand {
             CliCommand::Bench(_) => "measuring",
             CliCommand::Simulate(_) => "simulating",
             CliCommand::Analyze(_) => "analysing",
+            CliCommand::View(_) => "drawing",
             CliCommand::Export(_) => "exporting",
             CliCommand::Functions(_) | CliCommand::Explain(_) => "looking up",
         }

@@ -27,6 +27,8 @@ mod print;
 #[cfg(feature = "simulation")]
 mod search;
 mod table;
+#[cfg(feature = "simulation")]
+mod view;
 
 use arguments::{
     CheckArguments, CliCommand, CommandLine, Export, Generate, ModelArgs, ProgramArgs, ReportArguments, Verify,
@@ -76,6 +78,7 @@ fn main() -> ExitCode {
         CliCommand::Export(a) => export(&a),
         CliCommand::Simulate(a) => motion::simulate(&a),
         CliCommand::Analyze(a) => motion::analyze(&a),
+        CliCommand::View(a) => motion::view(&a),
         CliCommand::Functions(a) => print::functions(a.word.as_deref()).map_err(CommandFailure::Files),
         CliCommand::Explain(a) => explain_code(a.code.as_deref()),
     };

@@ -5,6 +5,7 @@ use crate::figures::{print_analysis, print_sweep};
 use crate::files::{self, read};
 pub use crate::motion_arguments::{Analyze, Simulate};
 use crate::search::{optimized, swept};
+pub use crate::view::{view, ViewArguments};
 use crate::{contact, gains, options, page, print, CommandFailure};
 use anstream::stdout;
 use std::io::Write;
@@ -45,7 +46,7 @@ pub fn built(description: &Description, options: &Options, diagnostics: &mut Dia
 }
 
 /// The robot of a file; to be `moved` by forces, its joints have to feel some inertia.
-fn robot(path: &Path, args: &ModelArgs, moved: bool) -> Result<(Description, Options, Model<f64>), CommandFailure> {
+pub fn robot(path: &Path, args: &ModelArgs, moved: bool) -> Result<(Description, Options, Model<f64>), CommandFailure> {
     let options = options(None, args)?;
     let source = read(path)?;
     let mut diagnostics = Diagnostics::reporting(&options.reporting);
@@ -60,7 +61,7 @@ fn robot(path: &Path, args: &ModelArgs, moved: bool) -> Result<(Description, Opt
     description.zip(model).map(|(d, model)| (d, options, model)).ok_or(CommandFailure::Input)
 }
 
-fn experiment(
+pub fn experiment(
     path: &Path,
     model: &Model<f64>,
     controller_model: &Model<f64>,
@@ -91,7 +92,7 @@ pub fn complained(complaint: Box<Diagnostic>) -> CommandFailure {
     print::refused(&diagnostics)
 }
 
-fn unreadable(path: &Path, why: &str) -> CommandFailure {
+pub fn unreadable(path: &Path, why: &str) -> CommandFailure {
     print::failure(format!("{}: {why}", path.display()))
 }
 
@@ -277,7 +278,8 @@ pub fn analyze(a: &Analyze) -> Result<(), CommandFailure> {
     }
 }
 
-fn joined(found: &Analysis) -> DataTable {
+/// All figures of an analysis over time.
+pub fn joined(found: &Analysis) -> DataTable {
     let beside = |table: DataTable, other: &DataTable| DataTable {
         names: [&table.names[..], &other.names[1..]].concat(),
         rows: table.rows.iter().zip(&other.rows).map(|(a, b)| [&a[..], &b[1..]].concat()).collect(),

@@ -1,4 +1,4 @@
-//! `simulate` and `analyze` where the feature `simulation` is not built in: they say so.
+//! `simulate`, `analyze` and `view` where the feature `simulation` is not built in: they say so.
 
 use crate::arguments::ModelArgs;
 use crate::{print, CommandFailure};
@@ -14,6 +14,7 @@ pub struct Simulate {
 }
 
 pub type Analyze = Simulate;
+pub type ViewArguments = Simulate;
 
 impl Simulate {
     /// It reads no robot.
@@ -30,5 +31,9 @@ pub fn simulate(_: &Simulate) -> Result<(), CommandFailure> {
 }
 
 pub fn analyze(a: &Analyze) -> Result<(), CommandFailure> {
+    simulate(a)
+}
+
+pub fn view(a: &ViewArguments) -> Result<(), CommandFailure> {
     simulate(a)
 }

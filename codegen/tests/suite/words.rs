@@ -34,7 +34,7 @@ const WORDS: [Word; 3] = [
         remedy: "C is written outside its room; make a `Routine`, or a part of the `Interface`, and let them write it",
     },
 ];
-const ROOMS: [&str; 8] = [
+const ROOMS: [&str; 9] = [
     "runtime/core/src",
     "runtime/src",
     "codegen/src",
@@ -43,6 +43,7 @@ const ROOMS: [&str; 8] = [
     "simulation/src",
     "jit/src",
     "python/src",
+    "view/src",
 ];
 
 /// Types that may share their name: only one of both is ever compiled, with the feature `simulation` of the command or without.

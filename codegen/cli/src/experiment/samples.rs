@@ -27,11 +27,7 @@ impl Columns {
 pub fn read(source: &Source, diagnostics: &mut Diagnostics) -> Option<Columns> {
     let mut found = Diagnostics::new();
     found.add_source(source);
-    let columns = match source.path().ends_with(".json") {
-        true => json(source, &mut found),
-        false => csv(source, &mut found),
-    };
-    let columns = columns.filter(|_| !found.has_errors());
+    let columns = table(source, &mut found);
     if let Some(columns) = &columns {
         match columns.get("t") {
             None => found.push(say::column_missing("t", &columns.names()).at(&source.place(0..0))),
@@ -43,6 +39,19 @@ pub fn read(source: &Source, diagnostics: &mut Diagnostics) -> Option<Columns> {
             }
         }
     }
+    let sound = !found.has_errors();
+    diagnostics.extend(found);
+    columns.filter(|_| sound)
+}
+
+/// Reads columns, whatever they are: JSON if the file's name ends so, else CSV. Complaints go to `diagnostics`; `None` after errors.
+pub fn table(source: &Source, diagnostics: &mut Diagnostics) -> Option<Columns> {
+    let mut found = Diagnostics::new();
+    found.add_source(source);
+    let columns = match source.path().ends_with(".json") {
+        true => json(source, &mut found),
+        false => csv(source, &mut found),
+    };
     let sound = !found.has_errors();
     diagnostics.extend(found);
     columns.filter(|_| sound)

@@ -20,3 +20,4 @@ mod options;
 mod parquet;
 mod report;
 mod simulation;
+mod view;

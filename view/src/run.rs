@@ -1,0 +1,199 @@
+//! What a page shows: configurations over time, and columns of numbers beside them.
+
+use straightline_core::joint::Descriptor;
+use straightline_core::model::{Joint, Model};
+
+/// Newton steps by which loops are closed where a run leaves out what they determine.
+const CLOSING_STEPS: usize = 20;
+
+/// A motion, and what else is known along it.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct ViewedRun {
+    /// Time of each row \[s\]; none is before the one above it. Where something jumps there are two rows of one time.
+    pub times: Vec<f64>,
+    /// q of each row, `model.nq()` numbers.
+    pub configurations: Vec<Vec<f64>>,
+    /// What is plotted, each with as many numbers as there are rows: names as `simulate` and `analyze` write them, such as `q.elbow`, `tau.elbow` and
+    /// `force.elbow.x`.
+    pub columns: Vec<(String, Vec<f64>)>,
+    /// What a reader of the page has to know of the run.
+    pub notes: Vec<String>,
+}
+
+/// Why a run cannot be shown.
+#[derive(Clone, Debug, PartialEq)]
+pub struct ViewFailure {
+    /// What is wrong, with names and values.
+    pub what: String,
+    /// What to do.
+    pub help: String,
+}
+
+impl std::fmt::Display for ViewFailure {
+    fn fmt(&self, f: &mut std::fmt::Formatter) -> std::fmt::Result {
+        write!(f, "{}; {}", self.what, self.help)
+    }
+}
+
+impl std::error::Error for ViewFailure {}
+
+/// Names of a joint's entries behind a prefix: `q.elbow`, or `q.base.px`, …
+pub(crate) fn entry_names(
+    prefix: &str,
+    joint: &Joint,
+    entries: fn(&Descriptor) -> &'static [&'static str],
+) -> Vec<String> {
+    match joint.kind.is_single() {
+        true => vec![format!("{prefix}.{}", joint.name)],
+        false => entries(joint.kind.row()).iter().map(|entry| format!("{prefix}.{}.{entry}", joint.name)).collect(),
+    }
+}
+
+impl ViewedRun {
+    /// A run from the columns of a file: `t`, and per joint `q.JOINT`, or `JOINT` alone; of joints with several coordinates one column per entry. A
+    /// base of which there is nothing stands where it is by default, joints that loops determine are solved for. All columns are plotted.
+    ///
+    /// # Errors
+    /// All columns that are missing, numbers that are not finite, times that go back.
+    pub fn of_columns(model: &Model<f64>, columns: &[(String, Vec<f64>)]) -> Result<ViewedRun, Vec<ViewFailure>> {
+        let find = |name: &str| columns.iter().find(|(n, _)| n == name).map(|(_, column)| column);
+        let mut failures = Vec::new();
+        let Some(times) = find("t").cloned() else { return Err(vec![missing(&["t".to_string()], columns)]) };
+        let mut run = ViewedRun { configurations: vec![neutral(model); times.len()], times, ..Default::default() };
+        let mut solved = false;
+        for joint in model.joints() {
+            let names = entry_names("q", joint, |row| row.entries[0]);
+            let given: Vec<_> = names.iter().map(|name| find(name)).collect();
+            let alone = find(&joint.name).filter(|_| joint.kind.is_single() && given[0].is_none());
+            let given: Vec<_> = given.into_iter().map(|column| column.or(alone)).collect();
+            if given.iter().all(Option::is_none) && joint.kind.is_base() {
+                run.notes.push(format!("The run says nothing of the base {}: it is drawn standing still.", joint.name));
+                continue;
+            }
+            if given.iter().all(Option::is_none) && joint.iv >= model.nv() {
+                solved = true;
+                continue;
+            }
+            let lacking: Vec<String> =
+                names.iter().zip(&given).filter(|(_, column)| column.is_none()).map(|(name, _)| name.clone()).collect();
+            if !lacking.is_empty() {
+                failures.push(missing(&lacking, columns));
+                continue;
+            }
+            for (k, column) in given.into_iter().flatten().enumerate() {
+                run.configurations.iter_mut().zip(column).for_each(|(q, x)| q[joint.iq + k] = *x);
+            }
+        }
+        run.columns = columns.iter().filter(|(name, _)| name != "t").cloned().collect();
+        if failures.is_empty() {
+            failures = run.check(model);
+        }
+        if !failures.is_empty() {
+            return Err(failures);
+        }
+        run.normalise(model)?;
+        if solved {
+            run.close(model)?;
+        }
+        Ok(run)
+    }
+
+    /// Brings quaternions to length one.
+    fn normalise(&mut self, model: &Model<f64>) -> Result<(), Vec<ViewFailure>> {
+        for (t, q) in self.times.iter().zip(&mut self.configurations) {
+            for joint in model.free_joints() {
+                let own = &mut q[joint.iq..joint.iq + joint.kind.nq()];
+                joint.kind.normalise(own);
+                if own.iter().any(|x| !x.is_finite()) {
+                    let what = format!("at t = {t:?} s the quaternion of {} has no length", joint.name);
+                    return Err(vec![ViewFailure { what, help: "write unit quaternions x, y, z, w".to_string() }]);
+                }
+            }
+        }
+        Ok(())
+    }
+
+    /// Solves for what loops determine, each row from the one before it.
+    fn close(&mut self, model: &Model<f64>) -> Result<(), Vec<ViewFailure>> {
+        let dependent: Vec<usize> =
+            model.dependent_joints().flat_map(|joint| joint.iq..joint.iq + joint.kind.nq()).collect();
+        let mut before = neutral(model);
+        for (t, q) in self.times.iter().zip(&mut self.configurations) {
+            dependent.iter().for_each(|k| q[*k] = before[*k]);
+            let (closed, _) = model.close_loops(q, CLOSING_STEPS);
+            if !is_closed(model, &closed) {
+                let what = format!("at t = {t:?} s the loops of {} cannot be closed", model.name);
+                let help = "let the run have a column for every joint of the loops".to_string();
+                return Err(vec![ViewFailure { what, help }]);
+            }
+            before.clone_from(&closed);
+            *q = closed;
+        }
+        self.notes.push("What loops determine is not in the run: it was solved for.".to_string());
+        Ok(())
+    }
+
+    /// What is wrong with it.
+    pub(crate) fn check(&self, model: &Model<f64>) -> Vec<ViewFailure> {
+        let mut failures = Vec::new();
+        let mut wrong = |what: String, help: &str| failures.push(ViewFailure { what, help: help.to_string() });
+        let rows = self.times.len();
+        if rows == 0 {
+            wrong("the run has no row".to_string(), "give it one at least");
+        }
+        if let Some(pair) = self.times.windows(2).find(|pair| pair[1] < pair[0]) {
+            wrong(format!("time goes from {:?} s to {:?} s", pair[0], pair[1]), "sort the rows by `t`");
+        }
+        if let Some(t) = self.times.iter().find(|t| !t.is_finite()) {
+            wrong(format!("a time is {t}, not a finite number"), "leave its row out");
+        }
+        if self.configurations.len() != rows || self.configurations.iter().any(|q| q.len() != model.nq()) {
+            let what = format!("{} times do not have {} coordinates each", rows, model.nq());
+            wrong(what, "give every row all coordinates of q");
+        }
+        for (name, column) in &self.columns {
+            if column.len() != rows {
+                wrong(format!("column `{name}` has {} numbers, `t` has {rows}", column.len()), "make them as many");
+            }
+            if let Some(k) = column.iter().position(|x| !x.is_finite()) {
+                let time = self.times.get(k).copied().unwrap_or(f64::NAN);
+                wrong(
+                    format!("at t = {time:?} s `{name}` is {}, not a finite number", column[k]),
+                    "leave the row or the column out",
+                );
+            }
+        }
+        if self.configurations.iter().flatten().any(|x| !x.is_finite()) {
+            wrong("a coordinate is not a finite number".to_string(), "leave its row out");
+        }
+        failures
+    }
+}
+
+/// Whether all loops are closed at q, to what one can see.
+pub(crate) fn is_closed(model: &Model<f64>, q: &[f64]) -> bool {
+    let y = model.tree_positions(q);
+    model.closure.loops.iter().flat_map(|of| model.gap(of, &y)).all(|gap| gap.abs() < 1e-6)
+}
+
+fn missing(names: &[String], columns: &[(String, Vec<f64>)]) -> ViewFailure {
+    let list =
+        |names: &mut dyn Iterator<Item = &String>| names.map(|n| format!("`{n}`")).collect::<Vec<_>>().join(", ");
+    let what = format!("there is no column {}", list(&mut names.iter()));
+    let help = format!("the columns are {}", list(&mut columns.iter().map(|(name, _)| name)));
+    ViewFailure { what, help }
+}
+
+/// Coordinates at which joints do nothing, or the nearest within their ranges; of a robot with loops those in which they were closed.
+pub(crate) fn neutral(model: &Model<f64>) -> Vec<f64> {
+    if !model.closure.is_empty() {
+        return model.closure.home.clone();
+    }
+    let mut q = vec![0.0; model.nq()];
+    for joint in model.free_joints() {
+        for (q, neutral) in q[joint.iq..].iter_mut().zip(joint.kind.row().neutral) {
+            *q = neutral.max(joint.limits.lower).min(joint.limits.upper);
+        }
+    }
+    q
+}
