@@ -6,6 +6,9 @@ use straightline_core::model::{Joint, Model};
 /// Newton steps by which loops are closed where a run leaves out what they determine.
 const CLOSING_STEPS: usize = 20;
 
+/// Columns that a complaint names, at most.
+const MOST_NAMED: usize = 12;
+
 /// A motion, and what else is known along it.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct ViewedRun {
@@ -57,10 +60,9 @@ impl ViewedRun {
     /// All columns that are missing, numbers that are not finite, times that go back.
     pub fn of_columns(model: &Model<f64>, columns: &[(String, Vec<f64>)]) -> Result<ViewedRun, Vec<ViewFailure>> {
         let find = |name: &str| columns.iter().find(|(n, _)| n == name).map(|(_, column)| column);
-        let mut failures = Vec::new();
         let Some(times) = find("t").cloned() else { return Err(vec![missing(&["t".to_string()], columns)]) };
         let mut run = ViewedRun { configurations: vec![neutral(model); times.len()], times, ..Default::default() };
-        let mut solved = false;
+        let (mut solved, mut all_lacking) = (false, Vec::new());
         for joint in model.joints() {
             let names = entry_names("q", joint, |row| row.entries[0]);
             let given: Vec<_> = names.iter().map(|name| find(name)).collect();
@@ -77,17 +79,18 @@ impl ViewedRun {
             let lacking: Vec<String> =
                 names.iter().zip(&given).filter(|(_, column)| column.is_none()).map(|(name, _)| name.clone()).collect();
             if !lacking.is_empty() {
-                failures.push(missing(&lacking, columns));
+                all_lacking.extend(lacking);
                 continue;
             }
             for (k, column) in given.into_iter().flatten().enumerate() {
                 run.configurations.iter_mut().zip(column).for_each(|(q, x)| q[joint.iq + k] = *x);
             }
         }
-        run.columns = columns.iter().filter(|(name, _)| name != "t").cloned().collect();
-        if failures.is_empty() {
-            failures = run.check(model);
+        if !all_lacking.is_empty() {
+            return Err(vec![missing(&all_lacking, columns)]);
         }
+        run.columns = columns.iter().filter(|(name, _)| name != "t").cloned().collect();
+        let failures = run.check(model);
         if !failures.is_empty() {
             return Err(failures);
         }
@@ -177,8 +180,14 @@ pub(crate) fn is_closed(model: &Model<f64>, q: &[f64]) -> bool {
 }
 
 fn missing(names: &[String], columns: &[(String, Vec<f64>)]) -> ViewFailure {
-    let list =
-        |names: &mut dyn Iterator<Item = &String>| names.map(|n| format!("`{n}`")).collect::<Vec<_>>().join(", ");
+    let list = |names: &mut dyn ExactSizeIterator<Item = &String>| {
+        let count = names.len();
+        let named = names.take(MOST_NAMED).map(|n| format!("`{n}`")).collect::<Vec<_>>().join(", ");
+        match count.saturating_sub(MOST_NAMED) {
+            0 => named,
+            others => format!("{named} and {others} others"),
+        }
+    };
     let what = format!("there is no column {}", list(&mut names.iter()));
     let help = format!("the columns are {}", list(&mut columns.iter().map(|(name, _)| name)));
     ViewFailure { what, help }

@@ -42,11 +42,8 @@ fn all_that_is_missing_is_said_at_once() {
     given.retain(|(name, _)| name != "q.to_column" && name != "q.to_hand.qz");
     let failures = ViewedRun::of_columns(&arm(), &given).unwrap_err();
     let said: Vec<String> = failures.iter().map(ToString::to_string).collect();
-    assert_eq!(said.len(), 2, "{said:?}");
-    assert!(
-        said[0].contains("`q.to_column`") && said[1].contains("`q.to_hand.qz`") && said[1].contains("`q.to_slide`"),
-        "{said:?}"
-    );
+    assert_eq!(said.len(), 1, "{said:?}");
+    assert!(["`q.to_column`", "`q.to_hand.qz`", "`q.to_slide`"].iter().all(|name| said[0].contains(name)), "{said:?}");
     let failures = ViewedRun::of_columns(&arm(), &columns(&[("x", &[1.0])])).unwrap_err();
     assert!(failures[0].what.contains("`t`"), "{failures:?}");
 }
