@@ -119,8 +119,8 @@ fn derivatives_of_robots_of_one_and_two_joints_agree_with_the_second_author() {
 }
 
 #[test]
-#[ignore = "slow proof: robots of two and three joints"]
-fn slow_proof_that_derivatives_of_robots_of_two_and_three_joints_agree_with_the_second_author() {
+#[ignore = "minutes: robots of two and three joints"]
+fn long_proof_that_derivatives_of_robots_of_two_and_three_joints_agree_with_the_second_author() {
     derivatives_of(2, |k| [3, 5].contains(&k));
     derivatives_of(3, |k| k == 3);
 }
@@ -149,7 +149,7 @@ fn slow_proof_that_robots_of_seven_joints_agree_with_the_second_author() {
 }
 
 #[test]
-#[ignore = "slow proof: every kind of robot of five to nine joints"]
+#[ignore = "minutes: every kind of robot of five to nine joints"]
 fn long_proof_that_robots_of_five_to_nine_joints_agree_with_the_second_author() {
     [5, 7, 9].into_iter().for_each(robots_of);
 }
@@ -191,7 +191,7 @@ fn operations_grow_linearly_with_the_number_of_links() {
 }
 
 #[test]
-#[ignore = "slow proof: chains of 150 links"]
+#[ignore = "minutes: chains of 150 links"]
 fn long_proof_that_operations_grow_linearly_with_the_number_of_links() {
     operations_grow_linearly(30);
 }
