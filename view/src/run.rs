@@ -118,17 +118,13 @@ impl ViewedRun {
 
     /// Solves for what loops determine, each row from the one before it.
     fn close(&mut self, model: &Model<f64>) -> Result<(), Vec<ViewFailure>> {
-        let dependent: Vec<usize> =
-            model.dependent_joints().flat_map(|joint| joint.iq..joint.iq + joint.kind.nq()).collect();
         let mut before = neutral(model);
         for (t, q) in self.times.iter().zip(&mut self.configurations) {
-            dependent.iter().for_each(|k| q[*k] = before[*k]);
-            let (closed, _) = model.close_loops(q, CLOSING_STEPS);
-            if !is_closed(model, &closed) {
+            let Some(closed) = closed(model, std::mem::take(q), &before) else {
                 let what = format!("at t = {t:?} s the loops of {} cannot be closed", model.name);
                 let help = "let the run have a column for every joint of the loops".to_string();
                 return Err(vec![ViewFailure { what, help }]);
-            }
+            };
             before.clone_from(&closed);
             *q = closed;
         }
@@ -173,10 +169,16 @@ impl ViewedRun {
     }
 }
 
-/// Whether all loops are closed at q, to what one can see.
-pub(crate) fn is_closed(model: &Model<f64>, q: &[f64]) -> bool {
-    let y = model.tree_positions(q);
-    model.closure.loops.iter().flat_map(|of| model.gap(of, &y)).all(|gap| gap.abs() < 1e-6)
+/// q with what loops determine, which is looked for from where it was `before`; `None` where loops do not close to what one can see.
+pub(crate) fn closed(model: &Model<f64>, mut q: Vec<f64>, before: &[f64]) -> Option<Vec<f64>> {
+    for joint in model.dependent_joints() {
+        let own = joint.iq..joint.iq + joint.kind.nq();
+        q[own.clone()].copy_from_slice(&before[own]);
+    }
+    let (q, _) = model.close_loops(&q, CLOSING_STEPS);
+    let y = model.tree_positions(&q);
+    let is_closed = model.closure.loops.iter().flat_map(|of| model.gap(of, &y)).all(|gap| gap.abs() < 1e-6);
+    is_closed.then_some(q)
 }
 
 fn missing(names: &[String], columns: &[(String, Vec<f64>)]) -> ViewFailure {

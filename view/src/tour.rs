@@ -1,7 +1,7 @@
 //! What is shown of a robot without a run: each joint goes through its range, one after the other.
 
 use crate::html::most_rows;
-use crate::run::{entry_names, is_closed, neutral, ViewedRun};
+use crate::run::{closed, entry_names, neutral, ViewedRun};
 use crate::solids::reach;
 use straightline_core::algorithms::integrate;
 use straightline_core::joint::Measure;
@@ -86,16 +86,10 @@ fn through(model: &Model<f64>, run: &mut ViewedRun, rows: usize, (k, [lower, upp
 
 /// Where the robot stands after this step of its independent coordinates; `None` where loops do not close.
 fn configuration(model: &Model<f64>, start: &[f64], before: &[f64], step: &[f64]) -> Option<Vec<f64>> {
-    let mut q = integrate(model, start, step);
+    let q = integrate(model, start, step);
     if model.closure.is_empty() {
         return Some(q);
     }
-    for joint in model.dependent_joints() {
-        let own = joint.iq..joint.iq + joint.kind.nq();
-        q[own.clone()].copy_from_slice(&before[own]);
-    }
-    let (closed, _) = model.close_loops(&q, 20);
     // another way of closing them is another robot
-    let is_near = closed.iter().zip(before).all(|(a, b)| (a - b).abs() < 1.0);
-    (is_near && is_closed(model, &closed)).then_some(closed)
+    closed(model, q, before).filter(|closed| closed.iter().zip(before).all(|(a, b)| (a - b).abs() < 1.0))
 }
