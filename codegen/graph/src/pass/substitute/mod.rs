@@ -31,7 +31,7 @@ use crate::expr::{Binary, Counts, Graph, NodeId};
 use net::Net;
 use search::EqualitySearch;
 use straightline_core::Dd;
-use values::{is_atom, values, AtPoints, POINTS};
+use values::{is_atom, true_values, values, AtPoints, POINTS};
 use zeros::{without, zeros};
 
 /// Two values that agree so well are equal; double-double has 1e-31, of the greatest term. Less well agree those of programs whose constants
@@ -39,6 +39,8 @@ use zeros::{without, zeros};
 const EQUAL: f64 = 1e-28;
 /// So little of it a result may change.
 const UNCHANGED: f64 = 1e-27;
+/// The same where there are roots: of differences, which have fewer digits, and at states of several sizes.
+const UNCHANGED_WITH_ROOTS: f64 = 1e-15;
 /// Values of the greatest graph that is searched once more: that finds little in great ones.
 const TWICE: usize = 600;
 /// Values that are looked at while moves are tried, in one round: of a program whose values agree by the thousand, the moves that gain
@@ -95,25 +97,39 @@ fn round(graph: &Graph, keeps: &dyn Fn(&Graph) -> bool) -> Option<Graph> {
     taken
 }
 
-/// The results at the random states, but for those that are zero; none where roots and signs stand for inputs, whose order is that of the graph.
-struct ExpectedResults(Option<Vec<Option<AtPoints>>>);
+/// The results at random states, but for those that are zero.
+struct ExpectedResults {
+    /// Roots and signs stand for inputs at the states that values are compared at, in the order of the graph, which changes: where there are
+    /// some, the results with true roots are looked at.
+    has_roots: bool,
+    results: Vec<Option<AtPoints>>,
+}
 
 impl ExpectedResults {
     /// Of a graph with these values, of which some are zero.
     fn of(graph: &Graph, values: &[AtPoints], zero: &[bool]) -> ExpectedResults {
-        let known = |r: &NodeId| (!zero[r.index()]).then_some(values[r.index()]);
-        ExpectedResults((!graph.ops.iter().any(is_atom)).then(|| graph.results.iter().map(known).collect()))
+        let known = |values: &[AtPoints]| -> Vec<Option<AtPoints>> {
+            graph.results.iter().map(|r| (!zero[r.index()]).then_some(values[r.index()])).collect()
+        };
+        let has_roots = graph.ops.iter().any(is_atom);
+        let results = if has_roots { known(&true_values(graph)) } else { known(values) };
+        ExpectedResults { has_roots, results }
     }
 
     /// Whether another program has them.
     fn are_those_of(&self, graph: &Graph) -> bool {
-        let ExpectedResults(Some(expected)) = self else { return true };
-        let values = values(graph);
+        let (values, part) = match self.has_roots {
+            true => (true_values(graph), UNCHANGED_WITH_ROOTS),
+            false => (values(graph), UNCHANGED),
+        };
+        // a root of a negative number is none before and after
+        let unchanged =
+            |a: Dd, b: Dd| (a.hi().is_nan() && b.hi().is_nan()) || (a - b).abs().hi() <= part * a.abs().hi();
         let same = |(before, r): (&Option<AtPoints>, &NodeId)| {
             let after = &values[r.index()];
-            before.is_none_or(|a| (0..POINTS).all(|k| (a[k] - after[k]).abs().hi() <= UNCHANGED * a[k].abs().hi()))
+            before.is_none_or(|before| (0..POINTS).all(|k| unchanged(before[k], after[k])))
         };
-        !graph.ops.iter().any(is_atom) && expected.iter().zip(&graph.results).all(same)
+        self.results.iter().zip(&graph.results).all(same)
     }
 }
 
@@ -282,6 +298,25 @@ mod tests {
     }
 
     /// y / ((x + y) z − x z − y z): infinite or no number, before and after.
+    /// 1 + t⁴ with t = 1e7 x is t⁴ to 28 digits where x is about one, and something else near zero.
+    #[test]
+    fn what_great_terms_hide_at_one_size_is_seen_at_another() {
+        let mut b = GraphBuilder::new(RuleSet::all(), vec![Port::new("x", &[3])]);
+        let [x, y, z] = [0, 1, 2].map(|k| b.insert(Op::Input(k)));
+        let [great, one] = [1e7, 1.0].map(|c| b.constant(Dd::from(c)));
+        let t = b.add(Op::mul(x, great));
+        let t2 = b.add(Op::mul(t, t));
+        let t4 = b.add(Op::mul(t2, t2));
+        let sum = b.add(Op::add(t4, one));
+        let y2 = b.add(Op::mul(y, y));
+        let root = b.add(Op::sqrt(y2));
+        let results = [(sum, z), (t4, root)].map(|(u, v)| b.add(Op::mul(u, v)));
+        let before = b.finish(vec![Port::new("z", &[2])], results.to_vec());
+        let after = substitute(&before, 3000, &|_| true);
+        let at = |graph: &Graph| crate::expr::evaluate(graph, &[1e-9, -1.3, 0.7].map(Dd::from))[0];
+        assert!((at(&before) - at(&after)).abs().hi() <= 1e-28, "{:?} {:?}", at(&before), at(&after));
+    }
+
     #[test]
     fn nothing_is_divided_by_a_zero_that_was_found() {
         let mut b = GraphBuilder::new(RuleSet::all(), vec![Port::new("x", &[3])]);
