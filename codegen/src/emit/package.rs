@@ -13,6 +13,8 @@ pub struct PackageKind {
     pub name: &'static str,
     /// What is in it.
     pub doc: &'static str,
+    /// Whether C calls its functions, on the machine that the scene names.
+    pub is_c: bool,
     /// Why there is none of a robot: what is wrong, and what helps.
     pub refusal: fn(&Generated) -> Option<[&'static str; 2]>,
     /// Its files, by their paths inside it. Names that other code could have begin with the prefix, an identifier.

@@ -1,7 +1,7 @@
 //! What reads packages back: a row per kind.
 
 use super::c99::{opencl, CReader};
-use super::{ptx, Mismatch};
+use super::{ptx, Mismatch, ReadingStop};
 use crate::emit::Generated;
 
 /// Checks the files of a package of this robot whose names begin with the prefix.
@@ -11,9 +11,27 @@ type PackageReader = fn(&Generated, &str, &[(String, String)]) -> Result<(), Mis
 static READERS: &[(&str, PackageReader)] = &[
     ("c-abi", |_, _, _| Ok(())),
     ("c99", |generated, prefix, files| CReader::new(generated, prefix).check(files)),
-    ("opencl", opencl::check),
-    ("ptx", ptx::check),
+    ("opencl", |generated, prefix, files| check_text("cl", opencl::read, (generated, prefix, files))),
+    ("ptx", |generated, prefix, files| check_text("ptx", ptx::read, (generated, prefix, files))),
 ];
+
+/// Reads the text of a package of this robot whose names begin with the prefix; the last is the function or file that is read.
+type TextReader = fn(&Generated, &str, &str, &mut String) -> Result<(), ReadingStop>;
+
+/// Checks a package whose code is one text, the file with this ending.
+fn check_text(
+    ending: &str,
+    read: TextReader,
+    (generated, prefix, files): (&Generated, &str, &[(String, String)]),
+) -> Result<(), Mismatch> {
+    let name = format!("{}_dynamics.{ending}", prefix.to_lowercase());
+    let text = file(files, &name)?;
+    let mut place = name;
+    read(generated, prefix, text, &mut place).map_err(|ReadingStop(stop)| {
+        let (at, what) = *stop;
+        mismatch(text, at, what, place)
+    })
+}
 
 /// Checks the files of a package of that kind.
 ///
@@ -44,4 +62,17 @@ pub(super) fn mismatch(text: &str, at: usize, what: String, function: String) ->
     let start = before.rfind('\n').map_or(0, |k| k + 1);
     let shown = text[start..].lines().next().unwrap_or_default().trim().chars().take(200).collect();
     Mismatch { function, line: before.matches('\n').count() + 1, text: shown, what }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::READERS;
+    use crate::emit::package::PACKAGES;
+
+    #[test]
+    fn every_kind_of_package_has_one_reader() {
+        let of = |name: &str| READERS.iter().filter(|(of, _)| *of == name).count();
+        let without: Vec<&str> = PACKAGES.iter().map(|kind| kind.name).filter(|name| of(name) != 1).collect();
+        assert!(without.is_empty() && READERS.len() == PACKAGES.len(), "{without:?}");
+    }
 }

@@ -5,7 +5,7 @@
 
 use super::values::{TextFormat, TextValue, Values};
 use super::wanted::{of_package, PackageFunction};
-use super::{packages, Mismatch, ReadingStop};
+use super::ReadingStop;
 use crate::emit::gpu::ptx::KERNEL;
 use crate::emit::Generated;
 use rustc_hash::FxHashMap;
@@ -13,18 +13,8 @@ use straightline_graph::expr::{Port, Sines};
 
 type Reading<X> = Result<X, ReadingStop>;
 
-/// Checks the files of a package.
-pub fn check(generated: &Generated, prefix: &str, files: &[(String, String)]) -> Result<(), Mismatch> {
-    let name = format!("{}_dynamics.ptx", prefix.to_lowercase());
-    let text = packages::file(files, &name)?;
-    let mut place = name;
-    read(generated, prefix, text, &mut place).map_err(|ReadingStop(stop)| {
-        let (at, what) = *stop;
-        packages::mismatch(text, at, what, place)
-    })
-}
-
-fn read(generated: &Generated, prefix: &str, text: &str, place: &mut String) -> Reading<()> {
+/// Checks the text of a package; `place` is what of it is read.
+pub(super) fn read(generated: &Generated, prefix: &str, text: &str, place: &mut String) -> Reading<()> {
     let file = place.clone();
     let mut lines = Lines::new(text)?;
     for expected in [".version 6.0", ".target sm_50", ".address_size 64"] {

@@ -159,7 +159,7 @@ fn nonzeros_are_the_entries_of_the_full_functions_and_of_symmetric_ones_one_tria
 fn headers_of_c_have_the_patterns() {
     let with =
         generated(Options { entries: WrittenEntries::Nonzeros, ..asked(&[Function::MassMatrix, Function::Jacobian]) });
-    for kind in PACKAGES.iter().filter(|kind| ["c-abi", "c99"].contains(&kind.name)) {
+    for kind in PACKAGES.iter().filter(|kind| kind.is_c) {
         let files = checked_package(kind, &with, "crane").unwrap_or_else(|d| panic!("{d}"));
         let header = &files.iter().find(|(name, _)| name.ends_with(".h")).expect("there is a header").1;
         let of = &with.report.function(Function::MassMatrix).expect("it was asked for").entries[0];

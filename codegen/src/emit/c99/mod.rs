@@ -25,6 +25,7 @@ const C_INDENT: &str = "    ";
 pub const C99_SOURCE: PackageKind = PackageKind {
     name: "c99",
     doc: "a C99 source without libraries, its header, and one for C++",
+    is_c: true,
     refusal: |generated| {
         rust_alone(generated).or(match () {
             () if generated.style.fused => Some([

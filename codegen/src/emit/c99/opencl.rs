@@ -15,6 +15,7 @@ use std::fmt::Write;
 pub const OPENCL: PackageKind = PackageKind {
     name: "opencl",
     doc: "OpenCL C for GPUs: a kernel per function, a state per work-item",
+    is_c: false,
     refusal: |generated| {
         other_machines(generated).or(generated.style.fused.then_some([
             "a package in OpenCL C has every operation rounded by itself",
@@ -26,14 +27,7 @@ pub const OPENCL: PackageKind = PackageKind {
 
 fn files(generated: &Generated, prefix: &str) -> Vec<(String, String)> {
     let interface = Interface::new(generated, prefix);
-    let library = &interface.library;
-    let readme = README
-        .replace("{robot}", &c_comment(&generated.model.name).replace(['`', '<', '['], "'"))
-        .replace("{provenance}", &interface.provenance())
-        .replace("{library}", library)
-        .replace("{prefix}", prefix)
-        .replace("{t}", generated.scalar.c_name());
-    vec![(format!("{library}.cl"), source(&interface)), ("README.md".to_string(), readme)]
+    vec![(format!("{}.cl", interface.library), source(&interface)), ("README.md".to_string(), interface.filled(README))]
 }
 
 /// What refuses compilers that would compute something else, and what C99 has and OpenCL C calls otherwise.
@@ -84,15 +78,13 @@ fn source(interface: &Interface<'_>) -> String {
         let _ = writeln!(out, "#define {part} static");
     }
     let _ = write!(out, "\n{}\n/* Functions of one state. */\n{functions}", used_by(&functions, prefix));
-    let exported = interface.all_exported();
-    for (name, _) in programs(generated) {
-        let function = exported.iter().find(|function| function.c_name == name).expect("every program is exported");
+    for (function, _) in programs(interface) {
         out.push_str("\n/*");
-        about(interface, &name).iter().for_each(|line| {
+        about(&function).iter().for_each(|line| {
             let _ = write!(out, " {}\n *", c_comment(line));
         });
         out.push_str("/\n");
-        out.push_str(&kernel(prefix, function));
+        out.push_str(&kernel(prefix, &function));
     }
     out
 }

@@ -1,4 +1,4 @@
-//! What a package in C99 says of itself.
+//! What packages say of themselves, and what one in C99 says.
 
 use super::c_comment;
 use super::interface::Interface;
@@ -10,15 +10,17 @@ const SIGNIFICANT: usize = 31;
 impl Interface<'_> {
     /// Its documentation.
     pub(super) fn readme(&self) -> String {
-        let (library, name) = (&self.library, c_comment(&self.generated.model.name));
-        let t = self.scalar().c_name();
-        README
-            .replace("{robot}", &name.replace(['`', '<', '['], "'"))
+        self.filled(README).replace("{names}", &self.significant_names())
+    }
+
+    /// A package's documentation with what is this package's own in the places of the names in braces.
+    pub(in crate::emit) fn filled(&self, documentation: &str) -> String {
+        documentation
+            .replace("{robot}", &c_comment(&self.generated.model.name).replace(['`', '<', '['], "'"))
             .replace("{provenance}", &self.provenance())
-            .replace("{library}", library)
+            .replace("{library}", &self.library)
             .replace("{prefix}", self.prefix)
-            .replace("{t}", t)
-            .replace("{names}", &self.significant_names())
+            .replace("{t}", self.scalar().c_name())
     }
 
     /// What is to be said of rule 5.1.

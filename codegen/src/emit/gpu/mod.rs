@@ -5,11 +5,12 @@
 
 pub mod ptx;
 
-use super::c99::interface::Interface;
+use super::c99::interface::{Exported, Interface};
 use super::package::rust_alone;
 use super::Generated;
 use crate::identifier::comment;
 use crate::program::written::WrittenFunction;
+use std::collections::BTreeMap;
 
 /// Why there is no package of what only other machines have.
 pub(super) fn other_machines(generated: &Generated) -> Option<[&'static str; 2]> {
@@ -25,20 +26,23 @@ pub(super) fn other_machines(generated: &Generated) -> Option<[&'static str; 2]>
     })
 }
 
-/// The programs that a package has, with the names that its functions have behind the prefix.
-pub(super) fn programs(generated: &Generated) -> Vec<(String, &WrittenFunction)> {
-    let programs = &generated.programs;
+/// The functions that a package has, each with its program.
+pub(super) fn programs<'g>(interface: &Interface<'g>) -> Vec<(Exported, &'g WrittenFunction)> {
+    let programs = &interface.generated.programs;
     let of_robot = programs.functions.iter().map(|program| (program.name.clone(), program));
     let of_modes = programs.modes.iter().flat_map(|mode| {
         mode.functions.iter().map(|program| (format!("contact_{}_{}", mode.identifier, program.name), program))
     });
-    of_robot.chain(of_modes).collect()
+    let mut exported: BTreeMap<String, Exported> =
+        interface.all_exported().into_iter().map(|function| (function.c_name.clone(), function)).collect();
+    let of = |(name, program): (String, &'g WrittenFunction)| {
+        (exported.remove(&name).expect("every program is exported"), program)
+    };
+    of_robot.chain(of_modes).map(of).collect()
 }
 
 /// What a function computes, and what it takes and gives: for a comment, line by line.
-pub(super) fn about(interface: &Interface<'_>, name: &str) -> Vec<String> {
-    let exported = interface.all_exported();
-    let function = exported.iter().find(|function| function.c_name == name).expect("every program is exported");
+pub(super) fn about(function: &Exported) -> Vec<String> {
     let mode = function.mode.iter().map(|mode| format!("In the contact mode {}.", comment(mode)));
     let ports = function.parameters.iter().map(|p| {
         let role = if p.is_output { "gives" } else { "takes" };

@@ -14,6 +14,7 @@ use crate::identifier::comment;
 use crate::program::written::WrittenFunction;
 use std::collections::{BTreeMap, HashMap};
 use std::fmt::Write;
+use std::sync::LazyLock;
 use straightline_graph::expr::op::OpRow;
 use straightline_graph::expr::{Graph, NodeId, Op, Port, Unary};
 use straightline_graph::schedule::{schedule, ScheduleLimits};
@@ -29,20 +30,17 @@ const SECTION: &str = "//== ";
 pub const PTX: PackageKind = PackageKind {
     name: "ptx",
     doc: "PTX for GPUs of NVIDIA: an entry per function, a state per thread",
+    is_c: false,
     refusal: other_machines,
     files,
 };
 
 fn files(generated: &Generated, prefix: &str) -> Vec<(String, String)> {
     let interface = Interface::new(generated, prefix);
-    let library = &interface.library;
-    let readme = README
-        .replace("{robot}", &comment(&generated.model.name).replace(['`', '<', '['], "'"))
-        .replace("{provenance}", &interface.provenance())
-        .replace("{library}", library)
-        .replace("{prefix}", prefix)
-        .replace("{t}", generated.scalar.c_name());
-    vec![(format!("{library}.ptx"), source(&interface)), ("README.md".to_string(), readme)]
+    vec![
+        (format!("{}.ptx", interface.library), source(&interface)),
+        ("README.md".to_string(), interface.filled(README)),
+    ]
 }
 
 /// The text.
@@ -53,12 +51,12 @@ fn source(interface: &Interface<'_>) -> String {
         comment(&generated.model.name),
         interface.provenance()
     );
-    for (name, program) in programs(generated) {
+    for (function, program) in programs(interface) {
         out.push('\n');
-        about(interface, &name).iter().for_each(|line| {
+        about(&function).iter().for_each(|line| {
             let _ = writeln!(out, "// {line}");
         });
-        let entry = format!("{}_{name}_batch_soa", interface.prefix);
+        let entry = format!("{}_{}_batch_soa", interface.prefix, function.c_name);
         out.push_str(&PtxEntry::new(&entry, program, generated).text());
     }
     out
@@ -71,8 +69,9 @@ fn literal(x: f64, scalar: Scalar) -> String {
 
 /// The body of a section of the kernel, with these in the places of the names in braces; none if there is no such section.
 fn block(section: &str, places: &[(&str, &str)]) -> Option<String> {
-    let (_, body) = KERNEL.split(SECTION).find_map(|s| s.split_once('\n').filter(|(name, _)| *name == section))?;
-    let code = body.lines().filter(|line| !line.is_empty() && !line.starts_with("//"));
+    static SECTIONS: LazyLock<HashMap<&str, &str>> =
+        LazyLock::new(|| KERNEL.split(SECTION).filter_map(|section| section.split_once('\n')).collect());
+    let code = SECTIONS.get(section)?.lines().filter(|line| !line.is_empty() && !line.starts_with("//"));
     let mut text = String::new();
     for line in code {
         let _ = writeln!(text, "    {line}");

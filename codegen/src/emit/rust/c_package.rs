@@ -19,6 +19,7 @@ use straightline_graph::Scalar;
 pub const C_ABI: PackageKind = PackageKind {
     name: "c-abi",
     doc: "a Rust package of functions with C's calling convention, and their header",
+    is_c: true,
     refusal: rust_alone,
     files: c_package,
 };

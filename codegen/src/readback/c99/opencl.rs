@@ -6,7 +6,7 @@ use super::{c_name, compare, definitions};
 use crate::emit::Generated;
 use crate::readback::values::Values;
 use crate::readback::wanted::{of_package, PackageFunction};
-use crate::readback::{packages, Mismatch, ReadingStop};
+use crate::readback::ReadingStop;
 use std::collections::BTreeSet;
 
 /// What compilers are told.
@@ -36,18 +36,13 @@ const HEAD_OF_DOUBLE: [&str; 5] = [
 /// What stands before the functions.
 const FUNCTIONS: &str = "\n/* Functions of one state. */\n";
 
-/// Checks the files of a package.
-pub fn check(generated: &Generated, prefix: &str, files: &[(String, String)]) -> Result<(), Mismatch> {
-    let name = format!("{}_dynamics.cl", prefix.to_lowercase());
-    let text = packages::file(files, &name)?;
-    let mut place = name;
-    read(generated, prefix, text, &mut place).map_err(|ReadingStop(stop)| {
-        let (at, what) = *stop;
-        packages::mismatch(text, at, what, place)
-    })
-}
-
-fn read(generated: &Generated, prefix: &str, source: &str, place: &mut String) -> Result<(), ReadingStop> {
+/// Checks the text of a package; `place` is what of it is read.
+pub(in crate::readback) fn read(
+    generated: &Generated,
+    prefix: &str,
+    source: &str,
+    place: &mut String,
+) -> Result<(), ReadingStop> {
     let file = place.clone();
     let (kernel, from) = head(source, prefix)?;
     let text = CText::read(source, from, false)?;
