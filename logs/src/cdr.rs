@@ -110,7 +110,11 @@ impl<'a> CdrReader<'a> {
         let is_big = self.is_big;
         to.extend(bytes.chunks_exact(8).map(|b| {
             let b: [u8; 8] = b.try_into().expect("eight");
-            if is_big { f64::from_be_bytes(b) } else { f64::from_le_bytes(b) }
+            if is_big {
+                f64::from_be_bytes(b)
+            } else {
+                f64::from_le_bytes(b)
+            }
         }));
         Ok(())
     }

@@ -27,7 +27,8 @@ pub fn read(bytes: &[u8]) -> Result<JointLog, LogError> {
             };
             if number.is_none() {
                 let line = record.position().map_or(0, ::csv::Position::line);
-                complaints.push(format!("line {line}: `{}` in column `{name}` is no number", String::from_utf8_lossy(field)));
+                complaints
+                    .push(format!("line {line}: `{}` in column `{name}` is no number", String::from_utf8_lossy(field)));
             }
             column.push(number.unwrap_or(f64::NAN));
         }
@@ -42,7 +43,11 @@ pub fn read(bytes: &[u8]) -> Result<JointLog, LogError> {
             let log = from_columns(columns)?;
             Ok(JointLog { start: start.unwrap_or(0).saturating_mul(1_000_000_000), ..log })
         }
-        false => Err(LogError::new("", complaints.join("\n  "), "numbers have a point, no comma; what is missing stays empty")),
+        false => Err(LogError::new(
+            "",
+            complaints.join("\n  "),
+            "numbers have a point, no comma; what is missing stays empty",
+        )),
     }
 }
 

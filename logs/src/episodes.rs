@@ -48,7 +48,13 @@ pub fn robust_spread(values: &[f64]) -> (f64, f64) {
 
 /// The episodes of a residual over stamps, within one segment. `spread` is its median and robust standard deviation, `least` the least distance that
 /// counts \[N·m or N\], so that rounding is no contact.
-pub fn episodes(times: &[f64], residual: &[f64], spread: (f64, f64), least: f64, demand: EpisodeDemand) -> Vec<Episode> {
+pub fn episodes(
+    times: &[f64],
+    residual: &[f64],
+    spread: (f64, f64),
+    least: f64,
+    demand: EpisodeDemand,
+) -> Vec<Episode> {
     let (middle, sigma) = spread;
     let threshold = (demand.sigmas * sigma).max(least);
     let mut found: Vec<Episode> = Vec::new();

@@ -66,7 +66,14 @@ impl LeastSquares {
         let n = self.columns;
         if n == 0 || self.count == 0 {
             let (zeros, errors) = (vec![0.0; n], vec![f64::INFINITY; n]);
-            return Fitted { coefficients: zeros, errors, untold: (0..n).collect(), covariance: vec![0.0; n * n], rms: 0.0, rows: self.count };
+            return Fitted {
+                coefficients: zeros,
+                errors,
+                untold: (0..n).collect(),
+                covariance: vec![0.0; n * n],
+                rms: 0.0,
+                rows: self.count,
+            };
         }
         // as many rows as columns, at least
         self.rows.resize(self.rows.len().max((n + 1) * (n + 1)), 0.0);
@@ -83,7 +90,8 @@ impl LeastSquares {
         let rank = (0..n).take_while(|k| r[(*k, *k)].abs() > LEAST_PIVOT).count();
         let projected = q.transpose() * &side;
         let upper = r.view((0, 0), (rank, rank)).into_owned();
-        let inverse = upper.solve_upper_triangular(&DMatrix::identity(rank, rank)).unwrap_or_else(|| DMatrix::zeros(rank, rank));
+        let inverse =
+            upper.solve_upper_triangular(&DMatrix::identity(rank, rank)).unwrap_or_else(|| DMatrix::zeros(rank, rank));
         let solution = &inverse * projected.rows(0, rank);
         let left = triangle[(n, n)].powi(2) + projected.rows(rank, n - rank).norm_squared();
         let samples = samples.unwrap_or(self.count).min(self.count);

@@ -52,8 +52,10 @@ struct McapPass {
 /// # Errors
 /// What is wrong with the bytes, and where; no topic, or several of them, have joint states.
 pub fn read(bytes: &[u8], topic: Option<&str>) -> Result<JointLog, LogError> {
-    let mut pass = McapPass { asked: topic.map(str::to_string), topic: topic.map(str::to_string), ..McapPass::default() };
-    let options = LinearReaderOptions::default().with_record_length_limit(LONGEST_RECORD).with_validate_chunk_crcs(true);
+    let mut pass =
+        McapPass { asked: topic.map(str::to_string), topic: topic.map(str::to_string), ..McapPass::default() };
+    let options =
+        LinearReaderOptions::default().with_record_length_limit(LONGEST_RECORD).with_validate_chunk_crcs(true);
     let mut reader = LinearReader::new_with_options(options);
     let mut given = 0;
     while let Some(event) = reader.next_event() {
@@ -67,7 +69,8 @@ pub fn read(bytes: &[u8], topic: Option<&str>) -> Result<JointLog, LogError> {
                 given += count;
             }
             Ok(LinearReadEvent::Record { opcode, data }) => {
-                let record = ::mcap::parse_record(opcode, data).map_err(|error| damaged(place(), &error.to_string()))?;
+                let record =
+                    ::mcap::parse_record(opcode, data).map_err(|error| damaged(place(), &error.to_string()))?;
                 pass.take(&record, given)?;
             }
             Err(error) => return Err(damaged(place(), &error.to_string())),
@@ -77,7 +80,8 @@ pub fn read(bytes: &[u8], topic: Option<&str>) -> Result<JointLog, LogError> {
 }
 
 fn damaged(place: String, what: &str) -> LogError {
-    let help = "the file is no MCAP file, or cut off, or damaged: `mcap doctor` says more, `mcap recover` saves what it can";
+    let help =
+        "the file is no MCAP file, or cut off, or damaged: `mcap doctor` says more, `mcap recover` saves what it can";
     LogError::new(place, what, help)
 }
 
@@ -102,7 +106,10 @@ impl McapPass {
 
     fn message(&mut self, header: &MessageHeader, data: &[u8], given: usize) -> Result<(), LogError> {
         let Some(channel) = self.channels.get_mut(&header.channel_id) else {
-            return Err(damaged(format!("byte {given}"), &format!("a message of channel {}, which is not declared", header.channel_id)));
+            return Err(damaged(
+                format!("byte {given}"),
+                &format!("a message of channel {}, which is not declared", header.channel_id),
+            ));
         };
         channel.topic.messages += 1;
         if !channel.is_readable() {
@@ -136,10 +143,12 @@ impl McapPass {
         channels.sort_by(|a, b| a.topic.name.cmp(&b.topic.name));
         let is_readable = |c: &&LogChannel| c.is_readable() && c.topic.messages > 0;
         let is_wanted = |c: &&LogChannel| asked.as_ref().is_none_or(|name| *name == c.topic.name);
-        let mut names: Vec<&str> = channels.iter().filter(is_readable).filter(is_wanted).map(|c| &c.topic.name[..]).collect();
+        let mut names: Vec<&str> =
+            channels.iter().filter(is_readable).filter(is_wanted).map(|c| &c.topic.name[..]).collect();
         // a topic may have a channel per publisher
         names.dedup();
-        let listed = |of: &mut dyn Iterator<Item = &LogChannel>| of.map(LogChannel::shown).collect::<Vec<_>>().join(", ");
+        let listed =
+            |of: &mut dyn Iterator<Item = &LogChannel>| of.map(LogChannel::shown).collect::<Vec<_>>().join(", ");
         match names[..] {
             [name] => {
                 let name = name.to_string();

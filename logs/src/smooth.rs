@@ -60,7 +60,8 @@ impl LowPass {
         }
         let k = (PI * relative).tan();
         let norm = 1.0 / (1.0 + SQRT_2 * k + k * k);
-        let (b, a) = ([k * k * norm, 2.0 * k * k * norm], [2.0 * (k * k - 1.0) * norm, (1.0 - SQRT_2 * k + k * k) * norm]);
+        let (b, a) =
+            ([k * k * norm, 2.0 * k * k * norm], [2.0 * (k * k - 1.0) * norm, (1.0 - SQRT_2 * k + k * k) * norm]);
         let pad = ((2.0 / relative).ceil() as usize).min(n - 1);
         let mut run = Vec::with_capacity(n + 2 * pad);
         run.extend((1..=pad).rev().map(|i| 2.0 * values[0] - values[i]));

@@ -34,19 +34,20 @@ const WORDS: [Word; 3] = [
         remedy: "C is written outside its room; make a `Routine`, or a part of the `Interface`, and let them write it",
     },
 ];
-const ROOMS: [&str; 8] = [
+const ROOMS: [&str; 9] = [
     "runtime/core/src",
     "runtime/src",
     "codegen/src",
     "codegen/cli/src",
     "codegen/macros/src",
     "simulation/src",
+    "logs/src",
     "jit/src",
     "python/src",
 ];
 
-/// Types that may share their name: only one of both is ever compiled, with the feature `simulation` of the command or without.
-const ALTERNATIVES: [&str; 2] = ["Analyze", "Simulate"];
+/// Types that may share their name: only one of both is ever compiled, with the features `simulation` and `logs` of the command or without.
+const ALTERNATIVES: [&str; 3] = ["Analyze", "Residuals", "Simulate"];
 
 /// The sources of rooms with their paths, but for the generated example.
 fn product(rooms: &[&str]) -> Vec<(String, String)> {

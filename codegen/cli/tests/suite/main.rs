@@ -19,4 +19,6 @@ mod options;
 #[cfg(feature = "parquet")]
 mod parquet;
 mod report;
+#[cfg(feature = "logs")]
+mod residuals;
 mod simulation;
