@@ -15,6 +15,7 @@ pub mod joint_state;
 pub mod log;
 pub mod mcap;
 pub mod observer;
+mod records;
 pub mod smooth;
 
 pub use failure::LogError;

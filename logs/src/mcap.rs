@@ -5,14 +5,11 @@
 use crate::failure::LogError;
 use crate::joint_state::{self, JointState};
 use crate::log::{JointLog, LogQuantity, LogRecorder, LogTopic};
+use crate::records::{damaged, for_each_record};
 use ::mcap::records::{MessageHeader, Record};
-use ::mcap::sans_io::linear_reader::{LinearReadEvent, LinearReader, LinearReaderOptions};
 use ::mcap::{Compression, WriteOptions, Writer};
 use std::collections::{BTreeMap, HashMap};
 use std::io::Cursor;
-
-/// The longest record that is read, and the longest chunk \[bytes\].
-const LONGEST_RECORD: usize = 1 << 28;
 
 /// The topic that logs are written to.
 pub const TOPIC: &str = "/joint_states";
@@ -54,39 +51,12 @@ struct McapPass {
 pub fn read(bytes: &[u8], topic: Option<&str>) -> Result<JointLog, LogError> {
     let mut pass =
         McapPass { asked: topic.map(str::to_string), topic: topic.map(str::to_string), ..McapPass::default() };
-    let options =
-        LinearReaderOptions::default().with_record_length_limit(LONGEST_RECORD).with_validate_chunk_crcs(true);
-    let mut reader = LinearReader::new_with_options(options);
-    let mut given = 0;
-    while let Some(event) = reader.next_event() {
-        let place = || format!("byte {given}");
-        match event {
-            Ok(LinearReadEvent::ReadRequest(wanted)) => {
-                let count = wanted.min(bytes.len() - given);
-                let room = reader.insert(count);
-                room[..count].copy_from_slice(&bytes[given..given + count]);
-                reader.notify_read(count);
-                given += count;
-            }
-            Ok(LinearReadEvent::Record { opcode, data }) => {
-                let record =
-                    ::mcap::parse_record(opcode, data).map_err(|error| damaged(place(), &error.to_string()))?;
-                pass.take(&record, given)?;
-            }
-            Err(error) => return Err(damaged(place(), &error.to_string())),
-        }
-    }
+    for_each_record(bytes, &mut |record, at| pass.take(record, at))?;
     pass.finish()
 }
 
-fn damaged(place: String, what: &str) -> LogError {
-    let help =
-        "the file is no MCAP file, or cut off, or damaged: `mcap doctor` says more, `mcap recover` saves what it can";
-    LogError::new(place, what, help)
-}
-
 impl McapPass {
-    fn take(&mut self, record: &Record, given: usize) -> Result<(), LogError> {
+    fn take(&mut self, record: &Record, at: usize) -> Result<(), LogError> {
         match record {
             Record::Schema { header, .. } => {
                 self.schemas.insert(header.id, header.name.clone());
@@ -98,18 +68,16 @@ impl McapPass {
                 let encoding = channel.message_encoding.clone();
                 self.channels.insert(channel.id, LogChannel { topic, encoding });
             }
-            Record::Message { header, data } => self.message(header, data, given)?,
+            Record::Message { header, data } => self.message(header, data, at)?,
             _ => {}
         }
         Ok(())
     }
 
-    fn message(&mut self, header: &MessageHeader, data: &[u8], given: usize) -> Result<(), LogError> {
+    fn message(&mut self, header: &MessageHeader, data: &[u8], at: usize) -> Result<(), LogError> {
         let Some(channel) = self.channels.get_mut(&header.channel_id) else {
-            return Err(damaged(
-                format!("byte {given}"),
-                &format!("a message of channel {}, which is not declared", header.channel_id),
-            ));
+            let what = format!("a message of channel {}, which is not declared", header.channel_id);
+            return Err(damaged(at, &what));
         };
         channel.topic.messages += 1;
         if !channel.is_readable() {
@@ -122,7 +90,7 @@ impl McapPass {
             Some(_) => {}
             None => self.topic = Some(name.clone()),
         }
-        let place = || format!("message {messages} of {name} (before byte {given} of the file)");
+        let place = || format!("message {messages} of {name} (at byte {at} of the file)");
         let help = format!("it is no {} in CDR, or damaged", joint_state::TYPE);
         let mut message = JointState::default();
         message.read(data).map_err(|what| LogError::new(place(), what, help))?;

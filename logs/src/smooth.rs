@@ -62,7 +62,8 @@ impl LowPass {
         let norm = 1.0 / (1.0 + SQRT_2 * k + k * k);
         let (b, a) =
             ([k * k * norm, 2.0 * k * k * norm], [2.0 * (k * k - 1.0) * norm, (1.0 - SQRT_2 * k + k * k) * norm]);
-        let pad = ((2.0 / relative).ceil() as usize).min(n - 1);
+        // five periods, after which what the filter remembers of its start is lost in rounding
+        let pad = ((5.0 / relative).ceil() as usize).min(n - 1);
         let mut run = Vec::with_capacity(n + 2 * pad);
         run.extend((1..=pad).rev().map(|i| 2.0 * values[0] - values[i]));
         run.extend_from_slice(values);
