@@ -91,9 +91,10 @@ impl McapPass {
             None => self.topic = Some(name.clone()),
         }
         let place = || format!("message {messages} of {name} (at byte {at} of the file)");
-        let help = format!("it is no {} in CDR, or damaged", joint_state::TYPE);
+        let unread =
+            |what: String| LogError::new(place(), what, format!("it is no {} in CDR, or damaged", joint_state::TYPE));
         let mut message = JointState::default();
-        message.read(data).map_err(|what| LogError::new(place(), what, help))?;
+        message.read(data).map_err(unread)?;
         let is_unstamped = message.stamp == 0 && header.log_time != 0;
         let stamp = if is_unstamped { i64::try_from(header.log_time).unwrap_or(i64::MAX) } else { message.stamp };
         let values = [&message.position[..], &message.velocity, &message.effort, &[]];
