@@ -31,7 +31,7 @@ pub struct Residuals {
     /// The topic, where an MCAP file has several with joint states
     #[arg(long, value_name = "TOPIC")]
     pub topic: Option<String>,
-    /// Cut-off of the low-pass that smoothes positions, velocities and torques alike, where the log has no accelerations, and of the observer
+    /// Cut-off of the low-pass that smoothes momentum and torques alike, where the log has no accelerations, and of the observer
     /// [default: 10 Hz, or a sixth of the sampling]
     #[arg(long, value_name = "HZ", value_parser = cutoff)]
     pub cutoff: Option<f64>,
@@ -226,7 +226,7 @@ impl Findings<'_> {
         let direct = match self.residuals.cutoff {
             None => "accelerations as the log has them".to_string(),
             Some(cutoff) => {
-                format!("positions, velocities and torques smoothed at {} Hz without phase", four_digits(cutoff))
+                format!("momentum and torques smoothed at {} Hz without phase", four_digits(cutoff))
             }
         };
         let (gain, n) = (four_digits(self.residuals.gain), self.explanation.rows);

@@ -13,11 +13,13 @@ const OWN: usize = JOINT_PARAMETERS.len();
 const CARRIED: usize = PAYLOAD_PARAMETERS.len();
 
 /// Rows of the log that are fitted, at most.
-const MOST_ROWS: usize = 20_000;
+const MOST_ROWS: usize = 8_000;
 /// So many standard errors from zero is a payload.
 const SURE: f64 = 5.0;
 /// Residuals that are no contact whatever their spread, as a part of the torques' root mean square.
 const LEAST_CONTACT: f64 = 1e-3;
+/// So many periods of the cut-off from ends of segments smoothing lacks neighbours.
+const END: f64 = 3.0;
 
 /// Figures of a joint.
 #[derive(Clone, Debug, PartialEq)]
@@ -64,7 +66,7 @@ pub struct Explanation {
 fn fitted_rows(log: &AlignedLog, residuals: &ResidualTorques) -> Vec<usize> {
     let period = log.report.period;
     let (margin, step) = match residuals.cutoff {
-        Some(cutoff) if period > 0.0 => (1.0 / cutoff, ((0.25 / (cutoff * period)) as usize).max(1)),
+        Some(cutoff) if period > 0.0 => (END / cutoff, ((0.25 / (cutoff * period)) as usize).max(1)),
         _ => (0.0, 1),
     };
     let mut rows = Vec::new();
@@ -90,41 +92,72 @@ fn signs(log: &AlignedLog, residuals: &ResidualTorques) -> Vec<Vec<f64>> {
     residuals.motion[1].iter().map(one).collect()
 }
 
+/// Torques of one unit of each parameter of the payload, per row and joint.
+type CarriedRows = Vec<Vec<[f64; 10]>>;
+
+/// A fit, and what it leaves.
+struct Solved {
+    found: Fitted,
+    /// Columns of the payload in front.
+    offset: usize,
+    payload: Option<PayloadFigure>,
+    left: Vec<Vec<f64>>,
+}
+
 /// Explains residuals by friction, and by a payload where units of it are given.
 pub fn explain(log: &AlignedLog, residuals: &ResidualTorques, payload: Option<&UnitPayloads>) -> Explanation {
-    let rows = fitted_rows(log, residuals);
+    let mut rows = fitted_rows(log, residuals);
     let signs = signs(log, residuals);
     let [q, qd, qdd] = &residuals.motion;
-    let carried: Option<Vec<Vec<[f64; 10]>>> =
+    let mut carried: Option<CarriedRows> =
         payload.map(|units| rows.iter().map(|i| units.rows([q, qd, qdd], *i)).collect());
-    let fit = |carried: Option<&Vec<Vec<[f64; 10]>>>| fitted(&rows, residuals, &signs, carried);
-    let mut found = fit(carried.as_ref());
-    let mut figure = carried.as_ref().map(|_| payload_figure(&found));
-    let mut used = carried.as_ref();
-    if figure.as_ref().is_some_and(|figure| !figure.is_found) {
-        (found, used) = (fit(None), None);
+    let mut solved = solve(log, residuals, &signs, &rows, carried.as_ref());
+    // somebody's hand is neither friction nor payload: what is far from all else is left out, and all else fitted again
+    let met: Vec<Episode> = (0..qd.len()).flat_map(|j| episodes_of(log, residuals, j, &solved.left[j])).collect();
+    let around = residuals.cutoff.map_or(0.0, |cutoff| 1.0 / cutoff);
+    let is_quiet = |t: f64| met.iter().all(|e| t < e.from - around || t > e.to + around);
+    let quiet: Vec<bool> = rows.iter().map(|i| is_quiet(log.times[*i])).collect();
+    let count = quiet.iter().filter(|is_quiet| **is_quiet).count();
+    if count < rows.len() && 2 * count > rows.len() {
+        let mut kept = quiet.iter();
+        rows.retain(|_| kept.next().is_some_and(|k| *k));
+        if let Some(carried) = &mut carried {
+            let mut kept = quiet.iter();
+            carried.retain(|_| kept.next().is_some_and(|k| *k));
+        }
+        solved = solve(log, residuals, &signs, &rows, carried.as_ref());
     }
-    if let (Some(figure), None) = (&mut figure, used) {
-        figure.is_found = false;
-    }
-    let offset = if used.is_some() { CARRIED } else { 0 };
-    let left = left_over(log, residuals, (&rows, used), (&found.coefficients, offset), &signs);
+    let Solved { found, offset, payload, left } = solved;
     let joints = (0..qd.len()).map(|j| joint_figure(log, residuals, j, (&found, offset), &left[j])).collect();
     let named = |k: &usize| match k.checked_sub(offset) {
         None => (None, PAYLOAD_PARAMETERS[*k]),
         Some(own) => (Some(own / OWN), JOINT_PARAMETERS[own % OWN]),
     };
     let untold = found.untold.iter().map(named).collect();
-    Explanation { joints, payload: figure, untold, left, rows: rows.len() }
+    Explanation { joints, payload, untold, left, rows: rows.len() }
+}
+
+/// Fits these rows, without a payload if that is no more than noise.
+fn solve(
+    log: &AlignedLog,
+    residuals: &ResidualTorques,
+    signs: &[Vec<f64>],
+    rows: &[usize],
+    carried: Option<&CarriedRows>,
+) -> Solved {
+    let mut found = fitted(rows, residuals, signs, carried);
+    let payload = carried.map(|_| payload_figure(&found));
+    let used = carried.filter(|_| payload.as_ref().is_some_and(|figure| figure.is_found));
+    if carried.is_some() && used.is_none() {
+        found = fitted(rows, residuals, signs, None);
+    }
+    let offset = if used.is_some() { CARRIED } else { 0 };
+    let left = left_over(log, residuals, (rows, used), (&found.coefficients, offset), signs);
+    Solved { found, offset, payload, left }
 }
 
 /// One fit of all joints: the columns of the payload, if any, then those of each joint.
-fn fitted(
-    rows: &[usize],
-    residuals: &ResidualTorques,
-    signs: &[Vec<f64>],
-    carried: Option<&Vec<Vec<[f64; 10]>>>,
-) -> Fitted {
+fn fitted(rows: &[usize], residuals: &ResidualTorques, signs: &[Vec<f64>], carried: Option<&CarriedRows>) -> Fitted {
     let joints = residuals.direct.len();
     let offset = if carried.is_some() { CARRIED } else { 0 };
     // joints are as noisy as they are strong: each counts in units of its own residual
@@ -168,7 +201,7 @@ fn payload_figure(found: &Fitted) -> PayloadFigure {
 fn left_over(
     log: &AlignedLog,
     residuals: &ResidualTorques,
-    (rows, carried): (&[usize], Option<&Vec<Vec<[f64; 10]>>>),
+    (rows, carried): (&[usize], Option<&CarriedRows>),
     (coefficients, offset): (&[f64], usize),
     signs: &[Vec<f64>],
 ) -> Vec<Vec<f64>> {
@@ -206,18 +239,8 @@ fn joint_figure(
     (found, offset): (&Fitted, usize),
     left: &[f64],
 ) -> JointFigure {
-    let square = |values: &[f64]| values.iter().map(|x| x * x).sum::<f64>() / values.len().max(1) as f64;
     let direct = &residuals.direct[j];
     let (all, rest) = (square(direct), square(left));
-    let spread = robust_spread(left);
-    let least = LEAST_CONTACT * square(&log.tau[j]).sqrt();
-    let margin = residuals.cutoff.map_or(0.0, |cutoff| 1.0 / cutoff);
-    let in_segment = |s: &std::ops::Range<usize>| {
-        let (first, last) = (log.times[s.start] + margin, log.times[s.end - 1] - margin);
-        let mut found = episodes(&log.times[s.clone()], &left[s.clone()], spread, least, EpisodeDemand::default());
-        found.retain(|episode| episode.to > first && episode.from < last);
-        found
-    };
     JointFigure {
         rms: [all.sqrt(), square(&residuals.observed[j]).sqrt()],
         bias: direct.iter().sum::<f64>() / direct.len().max(1) as f64,
@@ -226,6 +249,28 @@ fn joint_figure(
             (found.coefficients[k], found.errors[k])
         }),
         explained: if all > 0.0 { 1.0 - rest / all } else { 0.0 },
-        episodes: log.segments.iter().flat_map(in_segment).collect(),
+        episodes: episodes_of(log, residuals, j, left),
     }
+}
+
+fn square(values: &[f64]) -> f64 {
+    values.iter().map(|x| x * x).sum::<f64>() / values.len().max(1) as f64
+}
+
+/// The episodes of a joint, but for those at ends, where smoothing has no neighbours.
+fn episodes_of(log: &AlignedLog, residuals: &ResidualTorques, j: usize, left: &[f64]) -> Vec<Episode> {
+    let spread = robust_spread(left);
+    let least = LEAST_CONTACT * square(&log.tau[j]).sqrt().max(1e-6);
+    let wave = residuals.cutoff.map_or(0.0, |cutoff| 1.0 / cutoff);
+    // half a period of the cut-off: what is shorter is where friction changes its sign, a sample early or late
+    let usual = EpisodeDemand::default();
+    let demand = EpisodeDemand { duration: usual.duration.max(0.5 * wave), ..usual };
+    let in_segment = |s: &std::ops::Range<usize>| {
+        let times = &log.times[s.clone()];
+        let (first, last) = (times[0] + END * wave, times[times.len() - 1] - END * wave);
+        let inside = times.partition_point(|t| *t < first)..times.partition_point(|t| *t <= last);
+        let inside = inside.start..inside.end.max(inside.start);
+        episodes(&times[inside.clone()], &left[s.clone()][inside], spread, least, demand)
+    };
+    log.segments.iter().flat_map(in_segment).collect()
 }

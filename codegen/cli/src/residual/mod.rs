@@ -1,7 +1,7 @@
 //! Residual torques of a log: measured minus model, and what explains them.
 //!
-//! Two ways: the observer of momentum, which takes no acceleration, and inverse dynamics of accelerations that the log has, or that smoothed velocities
-//! give. What is left is explained by friction per joint and a payload at a frame, by one fit of all joints, since either alone would take on
+//! Two ways: the observer of momentum, which takes no acceleration, and inverse dynamics of accelerations that the log has. Where it has none, the
+//! equation of momentum is smoothed without phase, and momentum differentiated after that. What is left is explained by friction per joint and a payload at a frame, by one fit of all joints, since either alone would take on
 //! what belongs to the other.
 
 mod explain;
@@ -41,22 +41,26 @@ pub fn usual_cutoff(period: f64) -> f64 {
 /// Residual torques of a log whose joints stand in the order of the robot's.
 pub fn residual_torques(model: &TorqueModel, log: &AlignedLog, cutoff: f64) -> ResidualTorques {
     let gain = 2.0 * std::f64::consts::PI * cutoff;
-    let observed = observed(model, log, Observer { gain });
-    let smooth = log.qdd.is_none().then_some(LowPass { cutoff });
-    let (motion, tau) = match (smooth, &log.qdd) {
-        (Some(filter), _) => {
-            let ((q, _), (qd, qdd), (tau, _)) =
-                (smoothed(log, &log.q, filter), smoothed(log, &log.qd, filter), smoothed(log, &log.tau, filter));
-            ([q, qd, qdd], tau)
-        }
-        (None, qdd) => ([log.q.clone(), log.qd.clone(), qdd.clone().unwrap_or_default()], log.tau.clone()),
+    let (momentum, force) = momentum_and_force(model, log);
+    let observed = observed(log, [&momentum, &force], Observer { gain });
+    let Some(qdd) = &log.qdd else {
+        let filter = LowPass { cutoff };
+        let ((q, _), (qd, qdd)) = (smoothed(log, &log.q, filter), smoothed(log, &log.qd, filter));
+        // LP τ − LP (d/dt p − f): what is smoothed is linear in what is measured, so that a fast motion leaves nothing behind
+        let ((mut direct, _), (_, growth)) = (smoothed(log, &force, filter), smoothed(log, &momentum, filter));
+        subtract(&mut direct, &growth);
+        return ResidualTorques { cutoff: Some(cutoff), gain, motion: [q, qd, qdd], direct, observed };
     };
-    let model = model.inverse_dynamics([&motion[0], &motion[1], &motion[2]]);
-    let mut direct = tau;
-    for (direct, model) in direct.iter_mut().zip(&model) {
-        direct.iter_mut().zip(model).for_each(|(tau, model)| *tau -= model);
+    let motion = [log.q.clone(), log.qd.clone(), qdd.clone()];
+    let mut direct = log.tau.clone();
+    subtract(&mut direct, &model.inverse_dynamics([&motion[0], &motion[1], &motion[2]]));
+    ResidualTorques { cutoff: None, gain, motion, direct, observed }
+}
+
+fn subtract(from: &mut StateColumns, what: &StateColumns) {
+    for (from, what) in from.iter_mut().zip(what) {
+        from.iter_mut().zip(what).for_each(|(x, y)| *x -= y);
     }
-    ResidualTorques { cutoff: smooth.map(|f| f.cutoff), gain, motion, direct, observed }
 }
 
 /// Columns smoothed within the segments of a log, and their derivatives.
@@ -73,15 +77,19 @@ fn smoothed(log: &AlignedLog, columns: &StateColumns, filter: LowPass) -> (State
     columns.iter().map(one).unzip()
 }
 
-fn observed(model: &TorqueModel, log: &AlignedLog, observer: Observer) -> StateColumns {
-    let momentum = model.momentum(&log.q, &log.qd);
+/// p = H q̇, and what lets it grow, τ + f.
+fn momentum_and_force(model: &TorqueModel, log: &AlignedLog) -> (StateColumns, StateColumns) {
     let mut force = model.force_on_momentum(&log.q, &log.qd);
     for (force, tau) in force.iter_mut().zip(&log.tau) {
         force.iter_mut().zip(tau).for_each(|(f, tau)| *f += tau);
     }
+    (model.momentum(&log.q, &log.qd), force)
+}
+
+fn observed(log: &AlignedLog, [momentum, force]: [&StateColumns; 2], observer: Observer) -> StateColumns {
     let joint = |(p, f): (&Vec<f64>, &Vec<f64>)| -> Vec<f64> {
         let of = |s: &std::ops::Range<usize>| observer.residuals(&log.times[s.clone()], &p[s.clone()], &f[s.clone()]);
         log.segments.iter().flat_map(of).collect()
     };
-    momentum.iter().zip(&force).map(joint).collect()
+    momentum.iter().zip(force).map(joint).collect()
 }
