@@ -177,7 +177,8 @@ fn what_is_hidden_in_a_noisy_log_is_found() {
         assert_eq!(joint.episodes.len(), usize::from(k == 3), "joint {k}: {joint:?}");
     }
     let push = found.joints[3].episodes[0];
-    assert!((push.from - 30.0).abs() < 0.05 && (push.to - 30.4).abs() < 0.05 && push.peak > 7.0, "{push:?}");
+    // smoothing at 10 Hz spreads its ends by a period
+    assert!((push.from - 30.0).abs() < 0.1 && (push.to - 30.4).abs() < 0.1 && push.peak > 7.0, "{push:?}");
 }
 
 #[test]
