@@ -15,7 +15,9 @@ use straightline_codegen::options::GivenOptions;
 use straightline_codegen::Function;
 
 pub use crate::bench::Bench;
+pub use crate::look_up::{Explain, Functions};
 pub use crate::motion::{Analyze, Simulate, ViewArguments};
+pub use crate::residuals::Residuals;
 
 pub const EXIT_CODES: &str = "\
 Exit codes:
@@ -115,6 +117,9 @@ Examples:
     Analyze(Analyze),
     /// Draw a robot in motion: a page for the browser, complete in one file
     View(ViewArguments),
+    /// What a robot's log says beside the model: residual torques, friction, payload, contact
+    #[command(after_help = crate::residuals::help())]
+    Residuals(Residuals),
     /// Write a self-contained package for other languages
     #[command(after_help = format!("\
 With `--c-abi` the directory becomes a Rust package without dependencies; `cargo build --release` in it gives a shared
@@ -162,6 +167,7 @@ impl CliCommand {
             CliCommand::Simulate(a) => return a.model(),
             CliCommand::Analyze(a) => return a.model(),
             CliCommand::View(a) => return a.model(),
+            CliCommand::Residuals(a) => return a.model(),
             CliCommand::Export(a) => &a.model,
             CliCommand::Convert(_) | CliCommand::Functions(_) | CliCommand::Explain(_) => return None,
         })
@@ -187,22 +193,11 @@ impl CliCommand {
             CliCommand::Simulate(_) => "simulating",
             CliCommand::Analyze(_) => "analysing",
             CliCommand::View(_) => "drawing",
+            CliCommand::Residuals(_) => "reading a log",
             CliCommand::Export(_) => "exporting",
             CliCommand::Functions(_) | CliCommand::Explain(_) => "looking up",
         }
     }
-}
-
-#[derive(Debug, Args)]
-pub struct Functions {
-    /// A word of the name, of the summary, or another name, such as `RNEA`
-    pub word: Option<String>,
-}
-
-#[derive(Debug, Args)]
-pub struct Explain {
-    /// The code, as it stands in `warning[near-right-angle]`
-    pub code: Option<String>,
 }
 
 /// What the argument `ROBOT` is.

@@ -4,3 +4,5 @@
 #[cfg(feature = "simulation")]
 pub mod experiment;
 pub mod html;
+#[cfg(feature = "logs")]
+pub mod residual;

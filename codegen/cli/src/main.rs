@@ -15,6 +15,7 @@ mod files;
 #[cfg(feature = "simulation")]
 mod gains;
 mod given;
+mod look_up;
 mod machine_code;
 #[cfg_attr(not(feature = "simulation"), path = "without_simulation.rs")]
 mod motion;
@@ -24,6 +25,10 @@ mod motion_arguments;
 mod page;
 #[cfg_attr(not(feature = "simulation"), allow(dead_code))]
 mod print;
+#[cfg_attr(not(feature = "logs"), path = "without_logs.rs")]
+mod residuals;
+#[cfg(feature = "logs")]
+mod residuals_page;
 #[cfg(feature = "simulation")]
 mod search;
 mod table;
@@ -79,6 +84,7 @@ fn main() -> ExitCode {
         CliCommand::Simulate(a) => motion::simulate(&a),
         CliCommand::Analyze(a) => motion::analyze(&a),
         CliCommand::View(a) => motion::view(&a),
+        CliCommand::Residuals(a) => residuals::residuals(&a),
         CliCommand::Functions(a) => print::functions(a.word.as_deref()).map_err(CommandFailure::Files),
         CliCommand::Explain(a) => explain_code(a.code.as_deref()),
     };

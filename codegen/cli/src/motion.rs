@@ -6,7 +6,7 @@ use crate::files::{self, read};
 pub use crate::motion_arguments::{Analyze, Simulate};
 use crate::search::{optimized, swept};
 pub use crate::view::{view, ViewArguments};
-use crate::{contact, gains, options, page, print, CommandFailure};
+use crate::{contact, gains, options, page, print, residuals, CommandFailure};
 use anstream::stdout;
 use std::io::Write;
 use std::path::Path;
@@ -96,8 +96,11 @@ pub fn unreadable(path: &Path, why: &str) -> CommandFailure {
     print::failure(format!("{}: {why}", path.display()))
 }
 
-/// Writes a table as CSV, or as JSON or Parquet where the file's name says so.
+/// Writes a table as CSV, or as JSON, Parquet or MCAP where the file's name says so.
 pub fn write_table(path: &Path, table: &DataTable) -> Result<(), CommandFailure> {
+    if path.extension().is_some_and(|e| e.eq_ignore_ascii_case("mcap")) {
+        return files::write(path, &residuals::mcap_bytes(table)?);
+    }
     if parquet::is_parquet(path) {
         files::write(path, &parquet::bytes(table).map_err(|why| unreadable(path, &why))?)?;
         return Ok(());

@@ -309,6 +309,7 @@ fn sources_include_nothing_from_outside_their_packages() {
         "../runtime/core/src",
         "../simulation/src",
         "../view/src",
+        "../logs/src",
     ]
     .map(|folder| package().join(folder))
     .to_vec();

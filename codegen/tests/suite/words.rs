@@ -41,13 +41,14 @@ const ROOMS: [&str; 9] = [
     "codegen/cli/src",
     "codegen/macros/src",
     "simulation/src",
+    "logs/src",
     "jit/src",
     "python/src",
     "view/src",
 ];
 
-/// Types that may share their name: only one of both is ever compiled, with the feature `simulation` of the command or without.
-const ALTERNATIVES: [&str; 2] = ["Analyze", "Simulate"];
+/// Types that may share their name: only one of both is ever compiled, with the features `simulation` and `logs` of the command or without.
+const ALTERNATIVES: [&str; 3] = ["Analyze", "Residuals", "Simulate"];
 
 /// The sources of rooms with their paths, but for the generated example.
 fn product(rooms: &[&str]) -> Vec<(String, String)> {

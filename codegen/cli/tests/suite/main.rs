@@ -19,5 +19,7 @@ mod options;
 #[cfg(feature = "parquet")]
 mod parquet;
 mod report;
+#[cfg(feature = "logs")]
+mod residuals;
 mod simulation;
 mod view;

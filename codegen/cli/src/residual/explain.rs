@@ -1,0 +1,276 @@
+//! What explains residual torques: an offset, viscous and Coulomb friction per joint, and a payload; what is left may be contact.
+
+use super::payload::{UnitPayloads, PAYLOAD_PARAMETERS};
+use super::ResidualTorques;
+use straightline_logs::align::AlignedLog;
+use straightline_logs::episodes::{episodes, robust_spread, Episode, EpisodeDemand};
+use straightline_logs::fit::{Fitted, LeastSquares};
+use straightline_logs::smooth::LowPass;
+
+/// What is fitted of each joint: an offset \[N·m or N\], viscous friction \[N·m·s/rad or N·s/m\], Coulomb friction \[N·m or N\].
+pub const JOINT_PARAMETERS: [&str; 3] = ["offset", "viscous", "Coulomb"];
+const OWN: usize = JOINT_PARAMETERS.len();
+const CARRIED: usize = PAYLOAD_PARAMETERS.len();
+
+/// Rows of the log that are fitted, at most.
+const MOST_ROWS: usize = 8_000;
+/// So many standard errors from zero is a payload.
+const SURE: f64 = 5.0;
+/// Residuals that are no contact whatever their spread, as a part of the torques' root mean square.
+const LEAST_CONTACT: f64 = 1e-3;
+/// So many periods of the cut-off from ends of segments smoothing lacks neighbours.
+const END: f64 = 3.0;
+
+/// Figures of a joint.
+#[derive(Clone, Debug, PartialEq)]
+pub struct JointFigure {
+    /// Root mean square of measured minus model, by inverse dynamics and by the observer \[N·m or N\].
+    pub rms: [f64; 2],
+    /// Its mean, by inverse dynamics \[N·m or N\].
+    pub bias: f64,
+    /// What was fitted, in the order of [`JOINT_PARAMETERS`], each with its standard error.
+    pub fitted: [(f64, f64); 3],
+    /// The part of the mean square that the fit explains.
+    pub explained: f64,
+    /// When what is left is too far from its median for noise.
+    pub episodes: Vec<Episode>,
+}
+
+/// What the frame carries beside the model.
+#[derive(Clone, Debug, PartialEq)]
+pub struct PayloadFigure {
+    /// The ten parameters, each with its standard error, infinite where the data cannot tell it.
+    pub parameters: [(f64, f64); 10],
+    /// The centre of mass in the frame \[m\], each coordinate with its standard error.
+    pub centre: [(f64, f64); 3],
+    /// Whether it is more than noise; else the friction is fitted without it.
+    pub is_found: bool,
+}
+
+/// What explains residuals.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Explanation {
+    /// Per joint.
+    pub joints: Vec<JointFigure>,
+    /// At the frame, if one was asked for.
+    pub payload: Option<PayloadFigure>,
+    /// Names of parameters that the data cannot tell from others, with the joint's index.
+    pub untold: Vec<(Option<usize>, &'static str)>,
+    /// Per joint what is left of measured minus model.
+    pub left: Vec<Vec<f64>>,
+    /// Rows that were fitted.
+    pub rows: usize,
+}
+
+/// The rows that are fitted: apart from ends, where smoothing has no neighbours, and as far apart as smoothed numbers are independent.
+fn fitted_rows(log: &AlignedLog, residuals: &ResidualTorques) -> Vec<usize> {
+    let period = log.report.period;
+    let (margin, step) = match residuals.cutoff {
+        Some(cutoff) if period > 0.0 => (END / cutoff, ((0.25 / (cutoff * period)) as usize).max(1)),
+        _ => (0.0, 1),
+    };
+    let mut rows = Vec::new();
+    for segment in &log.segments {
+        let (first, last) = (log.times[segment.start], log.times[segment.end - 1]);
+        let is_inside = |i: &usize| log.times[*i] >= first + margin && log.times[*i] <= last - margin;
+        rows.extend(segment.clone().filter(is_inside).step_by(step));
+    }
+    let thinned = rows.len().div_ceil(MOST_ROWS).max(1);
+    rows.into_iter().step_by(thinned).collect()
+}
+
+/// Per joint the sign of its velocity, smoothed as everything else is.
+fn signs(log: &AlignedLog, residuals: &ResidualTorques) -> Vec<Vec<f64>> {
+    let sign = |x: &f64| if *x == 0.0 { 0.0 } else { x.signum() };
+    let one = |qd: &Vec<f64>| -> Vec<f64> {
+        let signs: Vec<f64> = qd.iter().map(sign).collect();
+        let Some(cutoff) = residuals.cutoff else { return signs };
+        let part =
+            |s: &std::ops::Range<usize>| LowPass { cutoff }.apply(&log.times[s.clone()], &signs[s.clone()]).values;
+        log.segments.iter().flat_map(part).collect()
+    };
+    residuals.motion[1].iter().map(one).collect()
+}
+
+/// Torques of one unit of each parameter of the payload, per row and joint.
+type CarriedRows = Vec<Vec<[f64; 10]>>;
+
+/// A fit, and what it leaves.
+struct Solved {
+    found: Fitted,
+    /// Columns of the payload in front.
+    offset: usize,
+    payload: Option<PayloadFigure>,
+    left: Vec<Vec<f64>>,
+}
+
+/// Explains residuals by friction, and by a payload where units of it are given.
+pub fn explain(log: &AlignedLog, residuals: &ResidualTorques, payload: Option<&UnitPayloads>) -> Explanation {
+    let mut rows = fitted_rows(log, residuals);
+    let signs = signs(log, residuals);
+    let [q, qd, qdd] = &residuals.motion;
+    let mut carried: Option<CarriedRows> =
+        payload.map(|units| rows.iter().map(|i| units.rows([q, qd, qdd], *i)).collect());
+    let mut solved = solve(log, residuals, &signs, &rows, carried.as_ref());
+    // somebody's hand is neither friction nor payload: what is far from all else is left out, and all else fitted again
+    let met: Vec<Episode> = (0..qd.len()).flat_map(|j| episodes_of(log, residuals, j, &solved.left[j])).collect();
+    let around = residuals.cutoff.map_or(0.0, |cutoff| 1.0 / cutoff);
+    let is_quiet = |t: f64| met.iter().all(|e| t < e.from - around || t > e.to + around);
+    let quiet: Vec<bool> = rows.iter().map(|i| is_quiet(log.times[*i])).collect();
+    let count = quiet.iter().filter(|is_quiet| **is_quiet).count();
+    if count < rows.len() && 2 * count > rows.len() {
+        let mut kept = quiet.iter();
+        rows.retain(|_| kept.next().is_some_and(|k| *k));
+        if let Some(carried) = &mut carried {
+            let mut kept = quiet.iter();
+            carried.retain(|_| kept.next().is_some_and(|k| *k));
+        }
+        solved = solve(log, residuals, &signs, &rows, carried.as_ref());
+    }
+    let Solved { found, offset, payload, left } = solved;
+    let joints = (0..qd.len()).map(|j| joint_figure(log, residuals, j, (&found, offset), &left[j])).collect();
+    let named = |k: &usize| match k.checked_sub(offset) {
+        None => (None, PAYLOAD_PARAMETERS[*k]),
+        Some(own) => (Some(own / OWN), JOINT_PARAMETERS[own % OWN]),
+    };
+    let untold = found.untold.iter().map(named).collect();
+    Explanation { joints, payload, untold, left, rows: rows.len() }
+}
+
+/// Fits these rows, without a payload if that is no more than noise.
+fn solve(
+    log: &AlignedLog,
+    residuals: &ResidualTorques,
+    signs: &[Vec<f64>],
+    rows: &[usize],
+    carried: Option<&CarriedRows>,
+) -> Solved {
+    let mut found = fitted(rows, residuals, signs, carried);
+    let payload = carried.map(|_| payload_figure(&found));
+    let used = carried.filter(|_| payload.as_ref().is_some_and(|figure| figure.is_found));
+    if carried.is_some() && used.is_none() {
+        found = fitted(rows, residuals, signs, None);
+    }
+    let offset = if used.is_some() { CARRIED } else { 0 };
+    let left = left_over(log, residuals, (rows, used), (&found.coefficients, offset), signs);
+    Solved { found, offset, payload, left }
+}
+
+/// One fit of all joints: the columns of the payload, if any, then those of each joint.
+fn fitted(rows: &[usize], residuals: &ResidualTorques, signs: &[Vec<f64>], carried: Option<&CarriedRows>) -> Fitted {
+    let joints = residuals.direct.len();
+    let offset = if carried.is_some() { CARRIED } else { 0 };
+    // joints are as noisy as they are strong: each counts in units of its own residual
+    let scales: Vec<f64> = residuals.direct.iter().map(|r| robust_spread(r).1.max(1e-12)).collect();
+    let mut squares = LeastSquares::new(offset + OWN * joints);
+    let mut row = vec![0.0; offset + OWN * joints];
+    for (n, i) in rows.iter().enumerate() {
+        for j in 0..joints {
+            row.fill(0.0);
+            if let Some(carried) = carried {
+                row[..CARRIED].copy_from_slice(&carried[n][j]);
+            }
+            row[offset + OWN * j..][..OWN].copy_from_slice(&[1.0, residuals.motion[1][j][*i], signs[j][*i]]);
+            row.iter_mut().for_each(|x| *x /= scales[j]);
+            squares.push(&row, residuals.direct[j][*i] / scales[j]);
+        }
+    }
+    squares.finish(None)
+}
+
+fn payload_figure(found: &Fitted) -> PayloadFigure {
+    let parameters: [(f64, f64); 10] = std::array::from_fn(|k| (found.coefficients[k], found.errors[k]));
+    let mass = parameters[0].0;
+    let n = found.coefficients.len();
+    let centre = std::array::from_fn(|k| {
+        let c = parameters[1 + k].0 / mass;
+        // of a quotient: (σ_h² − 2 c σ_hm + c² σ_m²) / m²
+        let of = |a: usize, b: usize| found.covariance[a * n + b];
+        let variance = (of(1 + k, 1 + k) - 2.0 * c * of(1 + k, 0) + c * c * of(0, 0)) / (mass * mass);
+        match parameters[0].1.is_finite() && parameters[1 + k].1.is_finite() {
+            true => (c, variance.max(0.0).sqrt()),
+            false => (c, f64::INFINITY),
+        }
+    });
+    let is_found =
+        parameters[..4].iter().any(|(x, error)| error.is_finite() && x.abs() > SURE * error && x.abs() > 1e-6);
+    PayloadFigure { parameters, centre, is_found }
+}
+
+/// What is left of the residuals; between rows that were fitted the payload's torques follow straight lines.
+fn left_over(
+    log: &AlignedLog,
+    residuals: &ResidualTorques,
+    (rows, carried): (&[usize], Option<&CarriedRows>),
+    (coefficients, offset): (&[f64], usize),
+    signs: &[Vec<f64>],
+) -> Vec<Vec<f64>> {
+    let of_joint = |j: usize| -> Vec<f64> {
+        let own = &coefficients[offset + OWN * j..][..OWN];
+        let torque = |n: usize| -> f64 {
+            carried.map_or(0.0, |rows| rows[n][j].iter().zip(coefficients).map(|(y, x)| y * x).sum())
+        };
+        let torques: Vec<f64> = (0..rows.len()).map(torque).collect();
+        let mut n = 0;
+        let left = |i: usize| {
+            while n + 2 < rows.len() && rows[n + 1] < i {
+                n += 1;
+            }
+            let payload = match rows.len() {
+                0 => 0.0,
+                1 => torques[0],
+                _ => {
+                    let (from, to) = (log.times[rows[n]], log.times[rows[n + 1]]);
+                    let part = if to > from { ((log.times[i] - from) / (to - from)).clamp(0.0, 1.0) } else { 0.0 };
+                    torques[n] + part * (torques[n + 1] - torques[n])
+                }
+            };
+            residuals.direct[j][i] - payload - own[0] - own[1] * residuals.motion[1][j][i] - own[2] * signs[j][i]
+        };
+        (0..log.times.len()).map(left).collect()
+    };
+    (0..residuals.direct.len()).map(of_joint).collect()
+}
+
+fn joint_figure(
+    log: &AlignedLog,
+    residuals: &ResidualTorques,
+    j: usize,
+    (found, offset): (&Fitted, usize),
+    left: &[f64],
+) -> JointFigure {
+    let direct = &residuals.direct[j];
+    let (all, rest) = (square(direct), square(left));
+    JointFigure {
+        rms: [all.sqrt(), square(&residuals.observed[j]).sqrt()],
+        bias: direct.iter().sum::<f64>() / direct.len().max(1) as f64,
+        fitted: std::array::from_fn(|k| {
+            let k = offset + OWN * j + k;
+            (found.coefficients[k], found.errors[k])
+        }),
+        explained: if all > 0.0 { 1.0 - rest / all } else { 0.0 },
+        episodes: episodes_of(log, residuals, j, left),
+    }
+}
+
+fn square(values: &[f64]) -> f64 {
+    values.iter().map(|x| x * x).sum::<f64>() / values.len().max(1) as f64
+}
+
+/// The episodes of a joint, but for those at ends, where smoothing has no neighbours.
+fn episodes_of(log: &AlignedLog, residuals: &ResidualTorques, j: usize, left: &[f64]) -> Vec<Episode> {
+    let spread = robust_spread(left);
+    let least = LEAST_CONTACT * square(&log.tau[j]).sqrt().max(1e-6);
+    let wave = residuals.cutoff.map_or(0.0, |cutoff| 1.0 / cutoff);
+    // half a period of the cut-off: what is shorter is where friction changes its sign, a sample early or late
+    let usual = EpisodeDemand::default();
+    let demand = EpisodeDemand { duration: usual.duration.max(0.5 * wave), ..usual };
+    let in_segment = |s: &std::ops::Range<usize>| {
+        let times = &log.times[s.clone()];
+        let (first, last) = (times[0] + END * wave, times[times.len() - 1] - END * wave);
+        let inside = times.partition_point(|t| *t < first)..times.partition_point(|t| *t <= last);
+        let inside = inside.start..inside.end.max(inside.start);
+        episodes(&times[inside.clone()], &left[s.clone()][inside], spread, least, demand)
+    };
+    log.segments.iter().flat_map(in_segment).collect()
+}

@@ -1,0 +1,21 @@
+//! What robots log, and what it says of them.
+//!
+//! A [`log::JointLog`] is joint names, time stamps and columns of numbers, read from MCAP ([`mcap`]) or CSV ([`csv`]), with nothing repaired.
+//! [`align`] puts the joints into an order, judges the clock, and says what it met. [`smooth`], [`observer`], [`fit`] and [`episodes`] are what
+//! residual torques take; they know no robot: model torques come from the caller.
+#![forbid(unsafe_code)]
+
+pub mod align;
+pub mod cdr;
+pub mod csv;
+pub mod episodes;
+mod failure;
+pub mod fit;
+pub mod joint_state;
+pub mod log;
+pub mod mcap;
+pub mod observer;
+mod records;
+pub mod smooth;
+
+pub use failure::LogError;

@@ -1,0 +1,8 @@
+//! All tests of the package in one binary.
+
+mod columns;
+mod common;
+mod hostile;
+mod numbers;
+mod python;
+mod ros;
