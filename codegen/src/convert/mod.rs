@@ -13,6 +13,7 @@ pub mod compare;
 pub mod forms;
 mod loops;
 pub mod messages;
+pub mod renumber;
 mod springs;
 
 use crate::description::write::losses::{Loss, LossWeight};
@@ -66,7 +67,17 @@ pub fn convert(
     options: ConvertOptions,
     diagnostics: &mut Diagnostics,
 ) -> Option<String> {
-    let mut robot = description::read(source, diagnostics)?;
+    let robot = description::read(source, diagnostics)?;
+    written(robot, format, options, diagnostics)
+}
+
+/// The text of a robot in a format.
+fn written(
+    mut robot: Description,
+    format: &'static FileFormat,
+    options: ConvertOptions,
+    diagnostics: &mut Diagnostics,
+) -> Option<String> {
     // what is wrong with the robot is said before what the format cannot say
     let model_options = ModelOptions { floating_base: options.floating_base, ..ModelOptions::default() };
     let model = model::build(&robot, &model_options, diagnostics)?;

@@ -4,11 +4,11 @@
 
 use super::composite::{CompositeKind, WrittenComposite, COMPOSITES};
 use super::loops::WrittenLoop;
-use super::{drives, flexible, Angle, FileFormat, Noted, Rotation, WrittenPose};
+use super::{angle, drives, flexible, Angle, FileFormat, Noted, Rotation, WrittenPose};
 use crate::diagnostic::Place;
 use std::collections::HashSet;
 use straightline_core::joint::{self, Dialect, JointKind, Measure};
-use straightline_core::spatial::Sym3;
+use straightline_core::spatial::{Mat3, Sym3};
 
 /// How the robot stands in the world.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -196,6 +196,13 @@ pub struct WrittenInertial {
     pub rotation: Rotation,
     /// Inertia tensor about the centre of mass, in axes turned by `rotation` \[kg·m²\].
     pub inertia: Noted<Sym3<f64>>,
+}
+
+impl WrittenInertial {
+    /// The axes of the inertia in those of the link.
+    pub fn turn(&self) -> Mat3<f64> {
+        angle::rotation(&self.rotation, angle::ROUNDING).map(|x| x.to_f64())
+    }
 }
 
 /// What a file says of how a joint moves: a word of the table of joints, or `fixed`.

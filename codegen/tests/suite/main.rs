@@ -64,6 +64,7 @@ mod reduced_forms;
 mod reference_input;
 mod regressors;
 mod regressors_of_followers;
+mod renumber;
 mod robot_files;
 mod robots_as_written;
 mod rolled;

@@ -40,6 +40,7 @@ pub static WRITER: FormatWriter = FormatWriter {
     ],
     floats_by_option: false,
     text,
+    edits: None,
 };
 
 fn text(robot: &Description) -> String {

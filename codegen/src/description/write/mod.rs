@@ -4,6 +4,7 @@
 //! cannot say ([`losses`]). Numbers are the shortest that read back to the same f64.
 
 mod drives;
+pub mod edits;
 pub mod losses;
 pub(super) mod mjcf;
 mod rotations;
@@ -12,6 +13,8 @@ pub(super) mod toml;
 pub(super) mod urdf;
 
 use super::{Description, JointType, NamedFrame, WrittenJoint, WrittenLink};
+use crate::diagnostic::Source;
+use edits::TextEdit;
 use losses::Loss;
 pub(crate) use rotations::{of_length_one, pose_of};
 use std::collections::HashMap;
@@ -37,7 +40,12 @@ pub struct FormatWriter {
     pub floats_by_option: bool,
     /// The text of a robot.
     pub text: fn(&Description) -> String,
+    /// What changes in a file of a robot whose inertias and losses of joints are others; `None`: such a file is written anew.
+    pub edits: Option<NumberEdits>,
 }
+
+/// The changes that lead from a file, and what it says, to what it is to say.
+pub type NumberEdits = fn(&Source, [&Description; 2]) -> Vec<TextEdit>;
 
 /// Where joints stand in a format.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -1,6 +1,7 @@
 //! TOML with joint frames.
 
 use super::drives::of_drive;
+use super::edits::{TextEdit, TomlEdits};
 use super::{losses, number, rotations, word_of, FormatWriter, JointForm};
 use crate::description::angle::{self, ROUNDING};
 use crate::description::flexible::{Bending, Flexible};
@@ -8,8 +9,10 @@ use crate::description::{
     AngleUnit, BaseKind, Description, JointDrive, LoopPoints, Noted, Placement, Rotation, WrittenInertial,
     WrittenJoint, WrittenPose,
 };
+use crate::diagnostic::{Place, Source};
 use std::fmt::Write;
 use straightline_core::joint::Dialect;
+use straightline_core::spatial::Sym3;
 
 /// Writes TOML with joint frames.
 pub static WRITER: FormatWriter = FormatWriter {
@@ -21,6 +24,7 @@ pub static WRITER: FormatWriter = FormatWriter {
     losses: &[&losses::CARRIERS, &losses::JOINTS_BESIDE_FRAMES, &losses::SKIPPED],
     floats_by_option: false,
     text,
+    edits: Some(number_edits),
 };
 
 fn text(robot: &Description) -> String {
@@ -120,12 +124,16 @@ fn of_inertial(inertial: &WrittenInertial) -> String {
     if inertial.com.value != [0.0; 3] {
         _ = writeln!(out, "com = {}", array(&inertial.com.value));
     }
+    _ = writeln!(out, "inertia = {}", tensor(j));
+    rotation("inertia_rpy", &inertial.rotation).iter().for_each(|entry| _ = writeln!(out, "{entry}"));
+    out
+}
+
+fn tensor(j: &Sym3<f64>) -> String {
     let products = [("xy", j.xy), ("xz", j.xz), ("yz", j.yz)].into_iter().filter(|(_, x)| *x != 0.0);
     let entries = [("xx", j.xx), ("yy", j.yy), ("zz", j.zz)].into_iter().chain(products);
     let entries: Vec<String> = entries.map(|(key, x)| format!("{key} = {}", number(x))).collect();
-    _ = writeln!(out, "inertia = {{ {} }}", entries.join(", "));
-    rotation("inertia_rpy", &inertial.rotation).iter().for_each(|entry| _ = writeln!(out, "{entry}"));
-    out
+    format!("{{ {} }}", entries.join(", "))
 }
 
 fn of_joint(joint: &WrittenJoint) -> String {
@@ -202,4 +210,42 @@ fn of_flexible(flexible: &Flexible) -> String {
     entries.extend(entry("torsion", torsion));
     entries.push(format!("damping = {}", number(damping.value)));
     format!("{{ {} }}", entries.join(", "))
+}
+
+/// Numbers of inertials and of what joints lose.
+fn number_edits(source: &Source, [was, robot]: [&Description; 2]) -> Vec<TextEdit> {
+    let mut edits = TomlEdits::new(source.text());
+    let links =
+        was.links.iter().zip(&robot.links).filter_map(|(a, b)| Some((a.inertial.as_ref()?, b.inertial.as_ref()?)));
+    for (was, new) in links {
+        let mass = &was.mass.place;
+        // what is left out has the place of the whole link: of a table in braces, or of a head such as `[[link]]`, where a matrix has numbers
+        let written = |place: &Place| {
+            let is_around = place.span.start <= mass.span.start && mass.span.end <= place.span.end;
+            let inside = source.text()[place.span.clone()].trim_start_matches(['[', ' ', '\t', '\r', '\n']);
+            !is_around && !inside.starts_with(|c: char| c.is_alphabetic() || ['"', '\'', '_'].contains(&c))
+        };
+        edits.set_number("mass", Some((was.mass.value, mass)), mass, new.mass.value);
+        if was.com.value != new.com.value {
+            let place = Some(&was.com.place).filter(|place| written(place));
+            edits.set("com", place, mass, array(&new.com.value));
+        }
+        if was.inertia.value != new.inertia.value {
+            let place = Some(&was.inertia.place).filter(|place| written(place));
+            edits.set("inertia", place, mass, tensor(&new.inertia.value));
+        }
+    }
+    for (was, new) in was.joints.iter().zip(&robot.joints) {
+        let pairs = [
+            ("damping", &was.drive.damping, &new.drive.damping),
+            ("friction", &was.drive.friction, &new.drive.friction),
+            ("rotor_inertia", &was.drive.rotor_inertia, &new.drive.rotor_inertia),
+            ("armature", &was.drive.armature, &new.drive.armature),
+        ];
+        for (key, old, new) in pairs {
+            let old = old.as_ref().map(|old| (old.value, &old.place));
+            new.iter().for_each(|new| edits.set_number(key, old, &was.name.place, new.value));
+        }
+    }
+    edits.edits
 }

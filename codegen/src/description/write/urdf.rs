@@ -1,9 +1,14 @@
 //! URDF: links with their inertials, then joints. Frames are links without mass on fixed joints.
 
+use super::edits::{indentation, TextEdit};
 use super::{attribute, losses, number, numbers, rotations, word_of, FormatWriter, JointForm};
+use crate::description::reader::FileReader;
+use crate::description::xml::{self, children};
 use crate::description::{
     Description, JointLimits, JointType, Noted, Placement, Rotation, WrittenInertial, WrittenJoint, WrittenPose,
 };
+use crate::diagnostic::{Diagnostics, Source};
+use roxmltree::Node;
 use std::fmt::Write;
 use straightline_core::joint::Dialect;
 
@@ -31,6 +36,7 @@ pub static WRITER: FormatWriter = FormatWriter {
     ],
     floats_by_option: true,
     text,
+    edits: Some(number_edits),
 };
 
 fn text(robot: &Description) -> String {
@@ -126,5 +132,91 @@ fn element(name: &str, attributes: &[(&str, Option<f64>)]) -> String {
     match given.is_empty() {
         true => given,
         false => format!("    <{name}{given}/>\n"),
+    }
+}
+
+/// Numbers of inertials and of what joints lose.
+fn number_edits(source: &Source, [_, robot]: [&Description; 2]) -> Vec<TextEdit> {
+    let mut said = Diagnostics::new();
+    let edits = xml::parse(FileReader::new(source, &mut said), |_, document| {
+        let mut edits = XmlEdits { text: source.text(), edits: Vec::new() };
+        for node in children(document.root_element()) {
+            let name = node.attribute("name").unwrap_or_default();
+            match node.tag_name().name() {
+                "link" => edits.of_link(node, robot.link(name)?.inertial.as_ref()),
+                "joint" => edits.of_joint(node, robot.joint(name)?),
+                _ => {}
+            }
+        }
+        Some(edits.edits)
+    });
+    edits.unwrap_or_default()
+}
+
+/// Attributes that change.
+struct XmlEdits<'a> {
+    text: &'a str,
+    edits: Vec<TextEdit>,
+}
+
+impl XmlEdits<'_> {
+    fn of_link(&mut self, node: Node, inertial: Option<&WrittenInertial>) {
+        let (Some(node), Some(inertial)) = (children(node).find(|child| child.has_tag_name("inertial")), inertial)
+        else {
+            return;
+        };
+        let child = |name: &str| children(node).find(|child| child.has_tag_name(name));
+        let Some(mass) = child("mass") else { return };
+        self.set(mass, "value", &[inertial.mass.value]);
+        let j = &inertial.inertia.value;
+        let entries = [("ixx", j.xx), ("ixy", j.xy), ("ixz", j.xz), ("iyy", j.yy), ("iyz", j.yz), ("izz", j.zz)];
+        match child("inertia") {
+            Some(inertia) => entries.iter().for_each(|(name, entry)| self.set(inertia, name, &[*entry])),
+            None => {
+                let entries = entries.map(|(name, entry)| attribute(name, &number(entry))).concat();
+                self.insert_after(mass, &format!("<inertia{entries}/>"));
+            }
+        }
+        match child("origin") {
+            Some(origin) => self.set(origin, "xyz", &inertial.com.value),
+            None if inertial.com.value == [0.0; 3] => {}
+            None => self.insert_after(mass, &format!("<origin{}/>", attribute("xyz", &numbers(&inertial.com.value)))),
+        }
+    }
+
+    fn of_joint(&mut self, node: Node, joint: &WrittenJoint) {
+        let effects = [("damping", &joint.drive.damping), ("friction", &joint.drive.friction)];
+        let effects = effects.map(|(name, value)| (name, value.as_ref().map(|value| value.value)));
+        if let Some(dynamics) = children(node).find(|child| child.has_tag_name("dynamics")) {
+            effects.iter().for_each(|(name, value)| value.iter().for_each(|value| self.set(dynamics, name, &[*value])));
+            return;
+        }
+        let Some(beside) = children(node).find(|child| child.has_tag_name("child")) else { return };
+        let element = element("dynamics", &effects);
+        if !element.is_empty() {
+            self.insert_after(beside, element.trim());
+        }
+    }
+
+    /// Numbers of an attribute, unless they are what they were.
+    fn set(&mut self, node: Node, name: &str, values: &[f64]) {
+        let Some(was) = node.attribute_node(name) else {
+            let end = node.range().start
+                + 1
+                + self.text[node.range().start + 1..].find([' ', '\t', '\r', '\n', '/', '>']).unwrap_or(0);
+            if values.iter().any(|value| *value != 0.0) {
+                self.edits.push(TextEdit::insert(end, attribute(name, &numbers(values))));
+            }
+            return;
+        };
+        let is_same = was.value().split_ascii_whitespace().map(str::parse::<f64>).eq(values.iter().map(|x| Ok(*x)));
+        if !is_same {
+            self.edits.push(TextEdit { span: was.range_value(), text: numbers(values) });
+        }
+    }
+
+    fn insert_after(&mut self, node: Node, element: &str) {
+        let indent = indentation(self.text, node.range().start);
+        self.edits.push(TextEdit::insert(node.range().end, format!("\n{indent}{element}")));
     }
 }

@@ -41,6 +41,7 @@ pub static WRITER: FormatWriter = FormatWriter {
     ],
     floats_by_option: false,
     text,
+    edits: None,
 };
 
 /// The first version with quaternions, and that with `mimic`: older programs read what needs no more than the first.
