@@ -34,7 +34,7 @@ const WORDS: [Word; 3] = [
         remedy: "C is written outside its room; make a `Routine`, or a part of the `Interface`, and let them write it",
     },
 ];
-const ROOMS: [&str; 9] = [
+const ROOMS: [&str; 10] = [
     "runtime/core/src",
     "runtime/src",
     "codegen/src",
