@@ -96,6 +96,15 @@ impl<'a> CdrReader<'a> {
         Ok(())
     }
 
+    /// A double.
+    ///
+    /// # Errors
+    /// The message ends.
+    pub fn double(&mut self) -> Result<f64, String> {
+        let bytes: [u8; 8] = self.take(8, 8)?.try_into().expect("as many as asked for");
+        Ok(if self.is_big { f64::from_be_bytes(bytes) } else { f64::from_le_bytes(bytes) })
+    }
+
     /// A sequence of doubles into `to`.
     ///
     /// # Errors
@@ -154,6 +163,12 @@ impl CdrWriter {
         self.u32(text.len() as u32 + 1);
         self.bytes.extend(text.as_bytes());
         self.bytes.push(0);
+    }
+
+    /// A double.
+    pub fn double(&mut self, x: f64) {
+        self.align(8);
+        self.bytes.extend(x.to_le_bytes());
     }
 
     /// A sequence of doubles.

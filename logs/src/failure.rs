@@ -14,7 +14,8 @@ pub struct LogError {
 }
 
 impl LogError {
-    pub(crate) fn new(place: impl Into<String>, what: impl Into<String>, help: impl Into<String>) -> LogError {
+    /// Of its parts.
+    pub fn new(place: impl Into<String>, what: impl Into<String>, help: impl Into<String>) -> LogError {
         LogError { place: place.into(), what: what.into(), help: help.into() }
     }
 }

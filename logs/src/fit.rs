@@ -33,6 +33,8 @@ pub struct Fitted {
     pub covariance: Vec<f64>,
     /// The root of the mean square of what is left.
     pub rms: f64,
+    /// Square of the noise that the errors are made of.
+    pub variance: f64,
     /// The rows.
     pub rows: usize,
 }
@@ -61,6 +63,15 @@ impl LeastSquares {
         self.rows = triangle.transpose().as_slice().to_vec();
     }
 
+    /// The triangle that the rows come to, and what its columns are to add up to: the same least squares in as many rows as columns.
+    pub fn triangle(&self) -> (DMatrix<f64>, DVector<f64>) {
+        let (n, mut own) = (self.columns, self.clone());
+        own.rows.resize(own.rows.len().max((n + 1) * (n + 1)), 0.0);
+        own.fold();
+        let triangle = DMatrix::from_row_slice(n + 1, n + 1, &own.rows);
+        (triangle.view((0, 0), (n, n)).into_owned(), DVector::from_fn(n, |i, _| triangle[(i, n)]))
+    }
+
     /// The fit; `samples` says how many rows are independent of each other, if these are fewer than there are.
     pub fn finish(mut self, samples: Option<usize>) -> Fitted {
         let n = self.columns;
@@ -72,6 +83,7 @@ impl LeastSquares {
                 untold: (0..n).collect(),
                 covariance: vec![0.0; n * n],
                 rms: 0.0,
+                variance: 0.0,
                 rows: self.count,
             };
         }
@@ -104,6 +116,7 @@ impl LeastSquares {
             untold: order[rank..].to_vec(),
             covariance: vec![0.0; n * n],
             rms: (left / self.count as f64).sqrt(),
+            variance,
             rows: self.count,
         };
         // each row counts as `samples / count` of one

@@ -44,11 +44,7 @@ impl<'a> JointState<'a> {
     /// What is wrong with its bytes.
     pub fn read(&mut self, bytes: &'a [u8]) -> Result<(), String> {
         let mut cdr = CdrReader::new(bytes)?;
-        let (seconds, nanoseconds) = (cdr.i32()?, cdr.u32()?);
-        if nanoseconds >= 1_000_000_000 {
-            return Err(format!("a time stamp with {nanoseconds} ns beyond the second"));
-        }
-        self.stamp = i64::from(seconds) * 1_000_000_000 + i64::from(nanoseconds);
+        self.stamp = read_stamp(&mut cdr)?;
         cdr.string()?;
         cdr.strings(&mut self.names)?;
         cdr.doubles(&mut self.position)?;
@@ -57,15 +53,29 @@ impl<'a> JointState<'a> {
     }
 }
 
+/// The time stamp of a header \[ns\].
+pub(crate) fn read_stamp(cdr: &mut CdrReader) -> Result<i64, String> {
+    let (seconds, nanoseconds) = (cdr.i32()?, cdr.u32()?);
+    match nanoseconds < 1_000_000_000 {
+        true => Ok(i64::from(seconds) * 1_000_000_000 + i64::from(nanoseconds)),
+        false => Err(format!("a time stamp with {nanoseconds} ns beyond the second")),
+    }
+}
+
+pub(crate) fn write_stamp(cdr: &mut CdrWriter, stamp: i64) -> Result<(), String> {
+    let seconds = i32::try_from(stamp.div_euclid(1_000_000_000));
+    cdr.i32(seconds.map_err(|_| format!("the time stamp {stamp} ns does not fit into a message of ROS"))?);
+    cdr.u32(stamp.rem_euclid(1_000_000_000) as u32);
+    Ok(())
+}
+
 /// The bytes of a message: its stamp \[ns\], names, and per quantity one number per name, or none.
 ///
 /// # Errors
 /// Seconds that the message has no room for.
 pub fn bytes(stamp: i64, names: &[String], values: [&[f64]; 3]) -> Result<Vec<u8>, String> {
     let mut cdr = CdrWriter::default();
-    let seconds = i32::try_from(stamp.div_euclid(1_000_000_000));
-    cdr.i32(seconds.map_err(|_| format!("the time stamp {stamp} ns does not fit into a message of ROS"))?);
-    cdr.u32(stamp.rem_euclid(1_000_000_000) as u32);
+    write_stamp(&mut cdr, stamp)?;
     cdr.string("");
     cdr.u32(names.len() as u32);
     names.iter().for_each(|name| cdr.string(name));

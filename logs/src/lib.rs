@@ -2,11 +2,13 @@
 //!
 //! A [`log::JointLog`] is joint names, time stamps and columns of numbers, read from MCAP ([`mcap`]) or CSV ([`csv`]), with nothing repaired.
 //! [`align`] puts the joints into an order, judges the clock, and says what it met. [`smooth`], [`observer`], [`fit`] and [`episodes`] are what
-//! residual torques take; they know no robot: model torques come from the caller.
+//! residual torques take, [`weighted`] and [`consistent`] what identification does; they know no robot: model torques and regressors come from the caller.
 #![forbid(unsafe_code)]
 
 pub mod align;
 pub mod cdr;
+pub mod condition;
+pub mod consistent;
 pub mod csv;
 pub mod episodes;
 mod failure;
@@ -17,5 +19,7 @@ pub mod mcap;
 pub mod observer;
 mod records;
 pub mod smooth;
+pub mod transforms;
+pub mod weighted;
 
 pub use failure::LogError;

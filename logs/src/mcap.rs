@@ -6,6 +6,7 @@ use crate::failure::LogError;
 use crate::joint_state::{self, JointState};
 use crate::log::{JointLog, LogQuantity, LogRecorder, LogTopic};
 use crate::records::{damaged, for_each_record};
+use crate::transforms::{self, StampedTransform};
 use ::mcap::records::{MessageHeader, Record};
 use ::mcap::{Compression, WriteOptions, Writer};
 use std::collections::{BTreeMap, HashMap};
@@ -13,6 +14,80 @@ use std::io::Cursor;
 
 /// The topic that logs are written to.
 pub const TOPIC: &str = "/joint_states";
+/// The topic of poses, by whose name programs find them.
+pub const TRANSFORMS: &str = "/tf";
+
+/// Poses of frames in one of them, row by row of a log.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct LoggedFrames {
+    /// The frame in which the poses are.
+    pub parent: String,
+    /// The frames.
+    pub children: Vec<String>,
+    /// Per row and frame its origin \[m\] and its axes, as a quaternion x, y, z, w.
+    pub poses: Vec<Vec<([f64; 3], [f64; 4])>>,
+}
+
+impl LoggedFrames {
+    /// The same without a frame, such as the one in which the others are.
+    #[must_use]
+    pub fn without(mut self, name: &str) -> LoggedFrames {
+        let kept: Vec<bool> = self.children.iter().map(|child| child != name).collect();
+        for poses in &mut self.poses {
+            let mut kept = kept.iter();
+            poses.retain(|_| kept.next().is_none_or(|kept| *kept));
+        }
+        self.children.retain(|child| child != name);
+        self
+    }
+}
+
+/// A pose of a file.
+#[derive(Clone, Debug, PartialEq)]
+pub struct LoggedPose {
+    /// Time stamp \[ns\].
+    pub stamp: i64,
+    /// The frame in which the pose is.
+    pub parent: String,
+    /// The frame whose pose it is.
+    pub child: String,
+    /// Its origin \[m\].
+    pub translation: [f64; 3],
+    /// Its axes: quaternion x, y, z, w.
+    pub rotation: [f64; 4],
+}
+
+/// All poses of a file, in its order, of whatever topics have them.
+///
+/// # Errors
+/// What is wrong with the bytes, and where.
+pub fn frame_poses(bytes: &[u8]) -> Result<Vec<LoggedPose>, LogError> {
+    let (mut schemas, mut channels, mut found) = (HashMap::new(), HashMap::new(), Vec::new());
+    for_each_record(bytes, &mut |record, at| {
+        match record {
+            Record::Schema { header, .. } => _ = schemas.insert(header.id, header.name.clone()),
+            Record::Channel(channel) => {
+                let is_wanted = schemas.get(&channel.schema_id).is_some_and(|kind| kind == transforms::TYPE);
+                channels.insert(channel.id, is_wanted && channel.message_encoding == "cdr");
+            }
+            Record::Message { header, data } if channels.get(&header.channel_id) == Some(&true) => {
+                let help = format!("it is no {} in CDR, or damaged", transforms::TYPE);
+                let place = format!("a message at byte {at} of the file");
+                let read = transforms::read(data).map_err(|what| LogError::new(place, what, help))?;
+                found.extend(read.into_iter().map(|pose| LoggedPose {
+                    stamp: pose.stamp,
+                    parent: pose.parent.to_string(),
+                    child: pose.child.to_string(),
+                    translation: pose.translation,
+                    rotation: pose.rotation,
+                }));
+            }
+            _ => {}
+        }
+        Ok(())
+    })?;
+    Ok(found)
+}
 
 /// A channel of the file.
 #[derive(Debug)]
@@ -148,11 +223,27 @@ impl McapPass {
 /// # Errors
 /// Time stamps that ROS has no room for, or what the library says.
 pub fn bytes(log: &JointLog, topic: &str) -> Result<Vec<u8>, LogError> {
+    bytes_with(log, topic, &LoggedFrames::default())
+}
+
+/// The same with poses of frames, on the topic `/tf`.
+///
+/// # Errors
+/// As [`bytes`].
+pub fn bytes_with(log: &JointLog, topic: &str, frames: &LoggedFrames) -> Result<Vec<u8>, LogError> {
     let unwritten = |error: ::mcap::McapError| LogError::new("", format!("MCAP cannot be written: {error}"), "");
     let options = WriteOptions::new().compression(Some(Compression::Zstd)).profile("ros2").library("straightline");
     let mut writer = Writer::with_options(Cursor::new(Vec::new()), options).map_err(unwritten)?;
     let schema = writer.add_schema(joint_state::TYPE, "ros2msg", joint_state::SCHEMA.as_bytes()).map_err(unwritten)?;
     let channel_id = writer.add_channel(schema, topic, "cdr", &BTreeMap::new()).map_err(unwritten)?;
+    let of_frames = match frames.poses.is_empty() {
+        true => None,
+        false => {
+            let schema =
+                writer.add_schema(transforms::TYPE, "ros2msg", transforms::SCHEMA.as_bytes()).map_err(unwritten)?;
+            Some(writer.add_channel(schema, TRANSFORMS, "cdr", &BTreeMap::new()).map_err(unwritten)?)
+        }
+    };
     let mut row = [const { Vec::new() }; 3];
     for (i, t) in log.times.iter().enumerate() {
         let stamp = log.start.saturating_add((t * 1e9).round() as i64);
@@ -170,6 +261,19 @@ pub fn bytes(log: &JointLog, topic: &str) -> Result<Vec<u8>, LogError> {
         let time = u64::try_from(stamp).map_err(|_| stamped(format!("the time stamp {stamp} ns is negative")))?;
         let header = MessageHeader { channel_id, sequence: i as u32, log_time: time, publish_time: time };
         writer.write_to_known_channel(&header, &data).map_err(unwritten)?;
+        if let (Some(channel_id), Some(poses)) = (of_frames, frames.poses.get(i)) {
+            let named = frames.children.iter().zip(poses);
+            let stamped = named.map(|(child, (translation, rotation))| StampedTransform {
+                stamp,
+                parent: &frames.parent,
+                child,
+                translation: *translation,
+                rotation: *rotation,
+            });
+            let data =
+                transforms::bytes(&stamped.collect::<Vec<_>>()).map_err(|what| LogError::new(place(), what, help))?;
+            writer.write_to_known_channel(&MessageHeader { channel_id, ..header }, &data).map_err(unwritten)?;
+        }
     }
     writer.finish().map_err(unwritten)?;
     Ok(writer.into_inner().into_inner())

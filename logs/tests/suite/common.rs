@@ -21,6 +21,16 @@ impl Noise {
     pub fn uniform(&mut self) -> f64 {
         (self.bits() >> 11) as f64 / (1u64 << 52) as f64 - 1.0
     }
+
+    /// Uniform from 0 to 1.
+    pub fn from_zero(&mut self) -> f64 {
+        0.5 * (self.uniform() + 1.0)
+    }
+
+    /// Of a normal distribution with variance 1, as sums of twelve are.
+    pub fn normal(&mut self) -> f64 {
+        (0..12).map(|_| self.from_zero()).sum::<f64>() - 6.0
+    }
 }
 
 /// A message for the file of a test: topic, stamp of the header \[ns\], names, position, velocity, effort.

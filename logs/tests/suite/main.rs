@@ -3,6 +3,7 @@
 mod columns;
 mod common;
 mod hostile;
+mod identification;
 mod numbers;
 mod python;
 mod ros;
