@@ -48,6 +48,6 @@ mod tour;
 
 pub use html::{page, FIELD_OF_VIEW};
 pub use mesh::Triangle;
-pub use poses::{world_poses, ViewedPose};
+pub use poses::{frame_poses, world_poses, ViewedPose};
 pub use run::{ViewFailure, ViewedRun};
 pub use shapes::{urdf_look, ShapeForm, ViewedLook, ViewedShape};

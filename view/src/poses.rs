@@ -42,6 +42,11 @@ pub(crate) fn world_transforms(model: &Model<f64>, q: &[f64]) -> Vec<Transform<f
     forward_kinematics(model, q, &frames.iter().collect::<Vec<_>>())
 }
 
+/// Poses in the world of the frames of a model, in its order, at these coordinates (`model.nq()` of them).
+pub fn frame_poses(model: &Model<f64>, q: &[f64]) -> Vec<ViewedPose> {
+    forward_kinematics(model, q, &model.frames.iter().collect::<Vec<_>>()).iter().map(ViewedPose::from).collect()
+}
+
 /// Poses in the world of the canonical frames of all bodies, at these coordinates (`model.nq()` of them).
 pub fn world_poses(model: &Model<f64>, q: &[f64]) -> Vec<ViewedPose> {
     world_transforms(model, q).iter().map(ViewedPose::from).collect()

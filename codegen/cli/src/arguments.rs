@@ -15,9 +15,10 @@ use straightline_codegen::options::GivenOptions;
 use straightline_codegen::Function;
 
 pub use crate::bench::Bench;
+pub use crate::logs::{Identify, Residuals};
+use crate::look_up::EXPLAIN_HELP;
 pub use crate::look_up::{Explain, Functions};
 pub use crate::motion::{Analyze, Simulate, ViewArguments};
-pub use crate::residuals::Residuals;
 
 pub const EXIT_CODES: &str = "\
 Exit codes:
@@ -118,8 +119,11 @@ Examples:
     /// Draw a robot in motion: a page for the browser, complete in one file
     View(ViewArguments),
     /// What a robot's log says beside the model: residual torques, friction, payload, contact
-    #[command(after_help = crate::residuals::help())]
+    #[command(after_help = crate::logs::help_of_residuals())]
     Residuals(Residuals),
+    /// The numbers of a robot that its logs tell: inertias, friction, rotors, with intervals, and the robot file with them
+    #[command(after_help = crate::logs::help_of_identify())]
+    Identify(Identify),
     /// Write a self-contained package for other languages
     #[command(after_help = format!("\
 With `--c-abi` the directory becomes a Rust package without dependencies; `cargo build --release` in it gives a shared
@@ -140,18 +144,7 @@ Examples:
   straightline functions RNEA")]
     Functions(Functions),
     /// Say what a complaint's code stands for, or list all codes
-    #[command(after_help = "\
-Warnings have levels: --allow CODE, --warn CODE and --deny CODE on the command line, allow(\"CODE\") in the derive,
-.allow(\"CODE\") in a build script, and in a scene
-
-  [diagnostics]
-  allow = [\"CODE\"]
-
-Of these plainer-form says that an optimisation of Straightline failed: it is always said, and can only be denied.
-
-Examples:
-  straightline explain
-  straightline explain near-right-angle")]
+    #[command(after_help = EXPLAIN_HELP)]
     Explain(Explain),
 }
 
@@ -168,6 +161,7 @@ impl CliCommand {
             CliCommand::Analyze(a) => return a.model(),
             CliCommand::View(a) => return a.model(),
             CliCommand::Residuals(a) => return a.model(),
+            CliCommand::Identify(a) => return a.model(),
             CliCommand::Export(a) => &a.model,
             CliCommand::Convert(_) | CliCommand::Functions(_) | CliCommand::Explain(_) => return None,
         })
@@ -194,6 +188,7 @@ impl CliCommand {
             CliCommand::Analyze(_) => "analysing",
             CliCommand::View(_) => "drawing",
             CliCommand::Residuals(_) => "reading a log",
+            CliCommand::Identify(_) => "identifying",
             CliCommand::Export(_) => "exporting",
             CliCommand::Functions(_) | CliCommand::Explain(_) => "looking up",
         }

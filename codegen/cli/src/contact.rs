@@ -2,7 +2,7 @@
 
 use crate::arguments::Simulate;
 use crate::files::{self, read as read_file};
-use crate::motion::{failed, lines, print_run, undrawn, write_table};
+use crate::motion::{failed, lines, print_run, undrawn, write_run};
 use crate::{print, CommandFailure};
 use anstream::stdout;
 use std::io::Write;
@@ -39,7 +39,7 @@ pub fn finish(
 ) -> Result<(), CommandFailure> {
     let ContactRun { run, events, drift } = run.map_err(|failure| failed(&failure))?;
     if let Some(path) = &a.output {
-        write_table(path, &run.table)?;
+        write_run(path, &run.table, &plant.model)?;
     }
     if let Some(path) = &a.svg {
         let plot = |title, unit, prefixes: &[&str]| Plot {

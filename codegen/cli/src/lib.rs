@@ -5,4 +5,6 @@
 pub mod experiment;
 pub mod html;
 #[cfg(feature = "logs")]
+pub mod identification;
+#[cfg(feature = "logs")]
 pub mod residual;

@@ -15,6 +15,14 @@ mod files;
 #[cfg(feature = "simulation")]
 mod gains;
 mod given;
+#[cfg(feature = "logs")]
+mod identify;
+#[cfg(feature = "logs")]
+mod lerobot;
+#[cfg(feature = "logs")]
+mod log_files;
+#[cfg_attr(not(feature = "logs"), path = "without_logs.rs")]
+mod logs;
 mod look_up;
 mod machine_code;
 #[cfg_attr(not(feature = "simulation"), path = "without_simulation.rs")]
@@ -25,7 +33,7 @@ mod motion_arguments;
 mod page;
 #[cfg_attr(not(feature = "simulation"), allow(dead_code))]
 mod print;
-#[cfg_attr(not(feature = "logs"), path = "without_logs.rs")]
+#[cfg(feature = "logs")]
 mod residuals;
 #[cfg(feature = "logs")]
 mod residuals_page;
@@ -84,7 +92,8 @@ fn main() -> ExitCode {
         CliCommand::Simulate(a) => motion::simulate(&a),
         CliCommand::Analyze(a) => motion::analyze(&a),
         CliCommand::View(a) => motion::view(&a),
-        CliCommand::Residuals(a) => residuals::residuals(&a),
+        CliCommand::Residuals(a) => logs::residuals(&a),
+        CliCommand::Identify(a) => logs::identify(&a),
         CliCommand::Functions(a) => print::functions(a.word.as_deref()).map_err(CommandFailure::Files),
         CliCommand::Explain(a) => explain_code(a.code.as_deref()),
     };

@@ -6,7 +6,7 @@ use crate::files::{self, read};
 pub use crate::motion_arguments::{Analyze, Simulate};
 use crate::search::{optimized, swept};
 pub use crate::view::{view, ViewArguments};
-use crate::{contact, gains, options, page, print, residuals, CommandFailure};
+use crate::{contact, gains, logs, options, page, print, CommandFailure};
 use anstream::stdout;
 use std::io::Write;
 use std::path::Path;
@@ -96,11 +96,16 @@ pub fn unreadable(path: &Path, why: &str) -> CommandFailure {
     print::failure(format!("{}: {why}", path.display()))
 }
 
-/// Writes a table as CSV, or as JSON, Parquet or MCAP where the file's name says so.
-pub fn write_table(path: &Path, table: &DataTable) -> Result<(), CommandFailure> {
-    if path.extension().is_some_and(|e| e.eq_ignore_ascii_case("mcap")) {
-        return files::write(path, &residuals::mcap_bytes(table)?);
+/// Writes what a robot did, as a log with the poses of its frames where the file's name ends in .mcap, or else as any table.
+pub fn write_run(path: &Path, table: &DataTable, model: &Model<f64>) -> Result<(), CommandFailure> {
+    match path.extension().is_some_and(|e| e.eq_ignore_ascii_case("mcap")) {
+        true => files::write(path, &logs::mcap_bytes(table, model)?),
+        false => write_table(path, table),
     }
+}
+
+/// Writes a table as CSV, or as JSON or Parquet where the file's name says so.
+pub fn write_table(path: &Path, table: &DataTable) -> Result<(), CommandFailure> {
     if parquet::is_parquet(path) {
         files::write(path, &parquet::bytes(table).map_err(|why| unreadable(path, &why))?)?;
         return Ok(());
@@ -191,7 +196,7 @@ pub fn simulate(a: &Simulate) -> Result<(), CommandFailure> {
     bar.finish_and_clear();
     let run = run.map_err(|failure| failed(&failure))?;
     if let Some(path) = &a.output {
-        write_table(path, &run.table)?;
+        write_run(path, &run.table, &plant.model)?;
     }
     if let Some(path) = &a.svg {
         let is_controlled = matches!(experiment.command, Command::Controller(_));
@@ -257,7 +262,7 @@ pub fn analyze(a: &Analyze) -> Result<(), CommandFailure> {
     };
     let found = analysis::analyze(&model, &motion, a.interval).map_err(|failure| not_analysed(&failure))?;
     if let Some(path) = &a.output {
-        write_table(path, &joined(&found))?;
+        write_run(path, &joined(&found), &model)?;
     }
     let swept = match &a.sweep {
         None => Vec::new(),

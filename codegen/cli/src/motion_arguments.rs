@@ -14,7 +14,7 @@ pub struct Simulate {
     /// The experiment: TOML, or samples of torques as CSV or JSON
     #[arg(short, long, value_name = "FILE")]
     pub input: PathBuf,
-    /// Where to write the result, as CSV or, if it ends in .json, .parquet or .mcap, as JSON, Parquet or MCAP (joint states of ROS 2)
+    /// Where to write the result, as CSV or, if it ends in .json, .parquet or .mcap, as JSON, Parquet or MCAP (joint states and poses of frames as messages of ROS 2)
     #[arg(short, long, value_name = "FILE")]
     pub output: Option<PathBuf>,
     /// Where to draw coordinates, torques and, of a controller, errors

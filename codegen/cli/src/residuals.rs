@@ -2,22 +2,19 @@
 
 use crate::arguments::{robot_file, ModelArgs, EXIT_CODES};
 use crate::files::{self, read};
+use crate::log_files::{aligned_log, cutoff, not_loaded, print_table, report_lines};
 use crate::{motion, options, print, residuals_page as page, CommandFailure};
 use anstream::stdout;
 use clap::Args;
 use std::io::Write;
-use std::path::{Path, PathBuf};
-use straightline_cli::experiment::parquet;
+use std::path::PathBuf;
 use straightline_cli::residual::payload::{last_link, UnitPayloads, PAYLOAD_PARAMETERS};
 use straightline_cli::residual::torques::TorqueModel;
 use straightline_cli::residual::{
     explain, residual_torques, usual_cutoff, Explanation, PayloadFigure, ResidualTorques,
 };
-use straightline_codegen::diagnostic::{six_digits, Severity};
-use straightline_jit::LoadError;
-use straightline_logs::align::{align, AlignedLog, LogReport};
-use straightline_logs::log::{from_columns, JointLog};
-use straightline_logs::{csv, mcap, LogError};
+use straightline_codegen::diagnostic::Severity;
+use straightline_logs::align::AlignedLog;
 use straightline_simulation::html::four_digits;
 use straightline_simulation::table::DataTable;
 
@@ -26,7 +23,7 @@ use straightline_simulation::table::DataTable;
 pub struct Residuals {
     #[arg(help = robot_file())]
     pub robot: PathBuf,
-    /// The log: MCAP with joint states of ROS 2, CSV, or Parquet
+    /// The log: MCAP with joint states of ROS 2, CSV, Parquet, or a folder of LeRobot
     pub log: PathBuf,
     /// The topic, where an MCAP file has several with joint states
     #[arg(long, value_name = "TOPIC")]
@@ -72,64 +69,11 @@ impl Residuals {
     }
 }
 
-fn cutoff(text: &str) -> Result<f64, String> {
-    match text.parse() {
-        Ok(x) if (1e-3..=1e5).contains(&x) => Ok(x),
-        _ => Err("a frequency between 0.001 and 100000 Hz".to_string()),
-    }
-}
-
-fn wrong(path: &Path, error: &LogError) -> CommandFailure {
-    let help: Vec<&str> = Some(error.help.as_str()).filter(|help| !help.is_empty()).into_iter().collect();
-    print::failure_with(format!("{}: {error}", path.display()), &help)
-}
-
-fn has_extension(path: &Path, wanted: &str) -> bool {
-    path.extension().is_some_and(|e| e.eq_ignore_ascii_case(wanted))
-}
-
-/// The log of a file, whose kind its name says.
-fn log(path: &Path, topic: Option<&str>) -> Result<JointLog, CommandFailure> {
-    files::note(path);
-    if topic.is_some() && !has_extension(path, "mcap") {
-        let text = format!("{} has no topics", path.display());
-        return Err(print::failure_with(text, &["`--topic` is for MCAP files: leave it out"]));
-    }
-    let found = if parquet::is_parquet(path) {
-        let table = parquet::read(path).map_err(|why| print::failure(format!("{}: {why}", path.display())))?;
-        let columns = table.names.iter().enumerate();
-        from_columns(columns.map(|(k, name)| (name.clone(), table.rows.iter().map(|row| row[k]).collect())).collect())
-    } else {
-        let bytes =
-            std::fs::read(path).map_err(|e| std::io::Error::new(e.kind(), format!("{}: {e}", path.display())))?;
-        if has_extension(path, "mcap") {
-            mcap::read(&bytes, topic)
-        } else if has_extension(path, "csv") {
-            csv::read(&bytes)
-        } else {
-            let help = ["logs end in .mcap, .csv or .parquet; `ros2 bag convert` makes MCAP of other bags"];
-            return Err(print::failure_with(format!("{}: no log that is known", path.display()), &help));
-        }
-    };
-    found.map_err(|error| wrong(path, &error))
-}
-
-/// A table with `t`, `q.`, `qd.` and `tau.` as MCAP.
-pub fn mcap_bytes(table: &DataTable) -> Result<Vec<u8>, CommandFailure> {
-    let columns = table.names.iter().enumerate();
-    let columns = columns.map(|(k, name)| (name.clone(), table.rows.iter().map(|row| row[k]).collect())).collect();
-    let bytes = from_columns(columns).and_then(|log| mcap::bytes(&log, mcap::TOPIC));
-    bytes.map_err(|error| print::failure_with(format!("no log can be made of this: {error}"), &[error.help]))
-}
-
 /// The command.
 pub fn residuals(a: &Residuals) -> Result<(), CommandFailure> {
     let options = options(None, &a.model)?;
     let source = read(&a.robot)?;
-    let model = TorqueModel::load(&source, &options).map_err(|error| match error {
-        LoadError::Wrong(diagnostics) => print::refused(&diagnostics),
-        other @ LoadError::Option { .. } => print::failure(other.to_string()),
-    })?;
+    let model = TorqueModel::load(&source, &options).map_err(not_loaded)?;
     print::diagnostics(model.warnings(), Severity::Warning);
     if let Some(why) = model.refusal() {
         return Err(print::failure(format!("{}: the robot has no residuals by a log: {why}", a.robot.display())));
@@ -143,7 +87,7 @@ pub fn residuals(a: &Residuals) -> Result<(), CommandFailure> {
         return Err(print::failure_with(format!("no frame `{frame}` that moves"), &[help]));
     }
     let joints = model.joints();
-    let aligned = align(&log(&a.log, a.topic.as_deref())?, &joints).map_err(|error| wrong(&a.log, &error))?;
+    let aligned = aligned_log(&a.log, a.topic.as_deref(), &joints)?;
     let cutoff = a.cutoff.unwrap_or_else(|| usual_cutoff(aligned.report.period));
     let residuals = residual_torques(&model, &aligned, cutoff);
     let explanation = explain(&aligned, &residuals, units.as_ref());
@@ -204,9 +148,13 @@ impl Findings<'_> {
         (head, self.model.joints().into_iter().zip(&self.explanation.joints).map(row).collect())
     }
 
-    /// Residuals over time.
+    /// Motion and residuals over time.
     fn table(&self) -> DataTable {
-        let kinds: [(&str, &Vec<Vec<f64>>); 3] = [
+        // with the motion, so that pages can draw it
+        let kinds: [(&str, &Vec<Vec<f64>>); 6] = [
+            ("q", &self.log.q),
+            ("qd", &self.log.qd),
+            ("tau", &self.log.tau),
             ("residual", &self.residuals.direct),
             ("observer", &self.residuals.observed),
             ("unexplained", &self.explanation.left),
@@ -305,62 +253,4 @@ impl Findings<'_> {
         }
         Ok(())
     }
-}
-
-fn print_table(out: &mut impl Write, head: &[&str], rows: &[Vec<String>]) -> std::io::Result<()> {
-    let width =
-        |k: usize| rows.iter().map(|r| r[k].chars().count()).chain([head[k].chars().count()]).max().unwrap_or(0);
-    let widths: Vec<usize> = (0..head.len()).map(width).collect();
-    let mut line = |cells: &mut dyn Iterator<Item = &str>| -> std::io::Result<()> {
-        for (k, (cell, width)) in cells.zip(&widths).enumerate() {
-            match k {
-                0 => write!(out, "{cell:<width$}")?,
-                _ => write!(out, "  {cell:>width$}")?,
-            }
-        }
-        writeln!(out)
-    };
-    line(&mut head.iter().copied())?;
-    rows.iter().try_for_each(|row| line(&mut row.iter().map(String::as_str)))
-}
-
-/// So many places are named one by one.
-const MOST_PLACES: usize = 5;
-
-/// What was met in a log.
-pub fn report_lines(report: &LogReport) -> Vec<String> {
-    let LogReport { rows, kept, period, .. } = report;
-    let rate = if *period > 0.0 { four_digits(1.0 / period) } else { "0".to_string() };
-    let mut lines = vec![format!("{kept} of {rows} rows, {rate} Hz; longest step {} s", six_digits(report.longest))];
-    let mut count = |n: usize, what: &str| {
-        if n > 0 {
-            lines.push(format!("{n} {what}"));
-        }
-    };
-    count(report.incomplete, "rows left out that lack a number, or have one that is not finite");
-    count(report.duplicates, "rows left out with the time stamp of the row before");
-    count(report.reordered, "messages with joints in another order, or other joints, than the message before");
-    count(report.unstamped, "messages without a time stamp of their own, taken at the time at which they were logged");
-    let listed = |all: &[(f64, f64)], shown: &dyn Fn(&(f64, f64)) -> String| {
-        let rest = if all.len() > MOST_PLACES { ", …" } else { "" };
-        all.iter().take(MOST_PLACES).map(shown).collect::<Vec<_>>().join(", ") + rest
-    };
-    if !report.gaps.is_empty() {
-        let gaps = listed(&report.gaps, &|(from, to)| format!("{from:.4} to {to:.4} s"));
-        lines.push(format!("{} gaps: {gaps}", report.gaps.len()));
-    }
-    if !report.jumps.is_empty() {
-        let jumps = listed(&report.jumps, &|(at, by)| format!("by {by:.4} s at {at:.4} s"));
-        lines.push(format!("the clock jumps back {} times: {jumps}", report.jumps.len()));
-    }
-    for (what, names) in [
-        ("joints of the log that the robot does not have", &report.unknown),
-        ("joints without velocity, whose positions are differentiated", &report.without_velocity),
-        ("not read", &report.others),
-    ] {
-        if !names.is_empty() {
-            lines.push(format!("{what}: {}", names.join(", ")));
-        }
-    }
-    lines
 }

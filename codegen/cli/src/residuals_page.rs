@@ -1,6 +1,7 @@
 //! The page of `residuals`, in the style of the other pages.
 
-use crate::residuals::{report_lines, Findings, Residuals};
+use crate::log_files::report_lines;
+use crate::residuals::{Findings, Residuals};
 use std::path::Path;
 use straightline_cli::html::STYLE;
 use straightline_simulation::html::Page;

@@ -2,7 +2,7 @@
 
 use crate::arguments::{robot_file, ModelArgs, EXIT_CODES};
 use crate::motion::{experiment, joined, not_analysed, robot, unreadable};
-use crate::{files, print, CommandFailure};
+use crate::{files, logs, print, CommandFailure};
 use clap::Args;
 use std::path::{Path, PathBuf};
 use straightline_cli::experiment::{parquet, samples};
@@ -19,7 +19,7 @@ const INTERVAL: f64 = 0.01;
 /// What `view` is told.
 #[derive(Debug, Args)]
 #[command(after_help = format!("\
-RUN is what `simulate` or `analyze` writes (CSV, JSON or Parquet): the columns q.JOINT move the robot, all columns are
+RUN is what `simulate`, `analyze` or `residuals` writes (CSV, JSON or Parquet), or a log in MCAP: the columns q.JOINT move the robot, all columns are
 plotted, and forces and torques are drawn as arrows. A motion in TOML (codegen/SIMULATION.md) is analysed first.
 Without RUN each joint moves through its range in turn.
 
@@ -33,7 +33,7 @@ Examples:
 pub struct ViewArguments {
     #[arg(help = robot_file())]
     pub robot: PathBuf,
-    /// The run: what `simulate` or `analyze` wrote as CSV, JSON or Parquet, or a motion in TOML [default: each joint moves through its range]
+    /// The run: what `simulate`, `analyze` or `residuals` wrote as CSV, JSON or Parquet, a log in MCAP or a folder of LeRobot, or a motion in TOML [default: each joint moves through its range]
     pub run: Option<PathBuf>,
     /// Where to write the page
     #[arg(short, long, value_name = "FILE")]
@@ -86,6 +86,10 @@ fn look(robot: &Path, model: &Model<f64>) -> Result<ViewedLook, CommandFailure> 
 
 /// The columns of a file.
 fn of_file(path: &Path, model: &Model<f64>) -> Result<ViewedRun, CommandFailure> {
+    if path.is_dir() || path.extension().is_some_and(|e| e.eq_ignore_ascii_case("mcap")) {
+        let columns = logs::run_columns(path)?;
+        return ViewedRun::of_columns(model, &columns).map_err(|failures| refused(Some(path), &failures));
+    }
     let source = match parquet::is_parquet(path) {
         false => files::read(path)?,
         true => {

@@ -1,4 +1,4 @@
-//! `residuals` and MCAP files where the feature `logs` is not built in: they say so.
+//! `residuals`, `identify` and MCAP files where the feature `logs` is not built in: they say so.
 
 use crate::arguments::ModelArgs;
 use crate::{print, CommandFailure};
@@ -13,6 +13,8 @@ pub struct Residuals {
     _ignored: Vec<OsString>,
 }
 
+pub type Identify = Residuals;
+
 impl Residuals {
     /// It reads no robot.
     pub fn model(&self) -> Option<&ModelArgs> {
@@ -21,7 +23,12 @@ impl Residuals {
 }
 
 /// What is said below its arguments.
-pub fn help() -> String {
+pub fn help_of_residuals() -> String {
+    String::new()
+}
+
+/// The same of the other command.
+pub fn help_of_identify() -> String {
     String::new()
 }
 
@@ -37,8 +44,22 @@ pub fn residuals(_: &Residuals) -> Result<(), CommandFailure> {
     Err(left_out())
 }
 
+/// The command.
+pub fn identify(_: &Identify) -> Result<(), CommandFailure> {
+    Err(left_out())
+}
+
 /// The bytes of a log as MCAP.
 #[cfg(feature = "simulation")]
-pub fn mcap_bytes(_: &straightline_simulation::table::DataTable) -> Result<Vec<u8>, CommandFailure> {
+pub fn mcap_bytes(
+    _: &straightline_simulation::table::DataTable,
+    _: &straightline_core::model::Model<f64>,
+) -> Result<Vec<u8>, CommandFailure> {
+    Err(left_out())
+}
+
+/// The columns of a log.
+#[cfg(feature = "simulation")]
+pub fn run_columns(_: &std::path::Path) -> Result<Vec<(String, Vec<f64>)>, CommandFailure> {
     Err(left_out())
 }

@@ -32,8 +32,28 @@ pub fn bytes(_: &DataTable) -> Result<Vec<u8>, String> {
     Err(LEFT_OUT.to_string())
 }
 
+/// A column that has as many numbers in each row.
+#[derive(Clone, Debug, PartialEq)]
+pub struct WideColumn {
+    /// Its name.
+    pub name: String,
+    /// Numbers in a row.
+    pub width: usize,
+    /// All of them, row by row.
+    pub numbers: Vec<f64>,
+}
+
+/// Columns of these names that a Parquet file has, of numbers or of lists of as many numbers in each row.
+///
+/// # Errors
+/// What is wrong with the file, or that this build does not read it.
+#[cfg(not(feature = "parquet"))]
+pub fn wide_columns(_: &Path, _: &[&str]) -> Result<Vec<WideColumn>, String> {
+    Err(LEFT_OUT.to_string())
+}
+
 #[cfg(feature = "parquet")]
-pub use known::{bytes, read};
+pub use known::{bytes, read, wide_columns};
 
 /// The samples of a file as what the reader of samples takes: of a Parquet file the CSV text of its columns, all digits of every
 /// number with them, so that a complaint about a row stands at its line.
@@ -49,7 +69,7 @@ pub fn source(path: &Path, shown: &str) -> Result<Source, String> {
 
 #[cfg(feature = "parquet")]
 mod known {
-    use super::{DataTable, Path};
+    use super::{DataTable, Path, WideColumn};
     use ::parquet::basic::{Compression, Repetition, Type as Physical};
     use ::parquet::column::reader::{ColumnReader, ColumnReaderImpl};
     use ::parquet::data_type::{DataType, DoubleType};
@@ -77,14 +97,7 @@ mod known {
                 if schema.column(k).max_rep_level() > 0 {
                     return Err(format!("column `{name}` holds lists; there is one number in a row"));
                 }
-                let mut numbers = match group.get_column_reader(k).map_err(said)? {
-                    ColumnReader::DoubleColumnReader(column) => numbers(column, rows, |x| x),
-                    ColumnReader::FloatColumnReader(column) => numbers(column, rows, f64::from),
-                    ColumnReader::Int32ColumnReader(column) => numbers(column, rows, f64::from),
-                    ColumnReader::Int64ColumnReader(column) => numbers(column, rows, |x| x as f64),
-                    _ => return Err(format!("column `{name}` holds no numbers")),
-                }
-                .map_err(|error| format!("column `{name}`: {}", said(error)))?;
+                let mut numbers = of_column(name, group.get_column_reader(k).map_err(said)?, rows)?;
                 if numbers.len() != rows {
                     return Err(format!("column `{name}` has gaps: {} numbers in {rows} rows", numbers.len()));
                 }
@@ -96,14 +109,56 @@ mod known {
         Ok(DataTable { names, rows })
     }
 
+    /// Columns of these names that a Parquet file has, of numbers or of lists of as many numbers in each row.
+    ///
+    /// # Errors
+    /// What is wrong with the file.
+    pub fn wide_columns(path: &Path, wanted: &[&str]) -> Result<Vec<WideColumn>, String> {
+        let file = std::fs::File::open(path).map_err(|error| error.to_string())?;
+        let reader = SerializedFileReader::new(file).map_err(said)?;
+        let schema = reader.metadata().file_metadata().schema_descr_ptr();
+        let mut found = Vec::new();
+        for k in 0..schema.num_columns() {
+            // columns of lists have their name in front
+            let name = schema.column(k).path().parts()[0].clone();
+            if !wanted.contains(&name.as_str()) {
+                continue;
+            }
+            let (mut all, mut rows) = (Vec::new(), 0);
+            for (group, metadata) in reader.metadata().row_groups().iter().enumerate() {
+                let own = usize::try_from(metadata.num_rows()).map_err(|error| error.to_string())?;
+                let group = reader.get_row_group(group).map_err(said)?;
+                all.extend(of_column(&name, group.get_column_reader(k).map_err(said)?, own)?);
+                rows += own;
+            }
+            let width = if rows == 0 { 0 } else { all.len() / rows };
+            if width * rows != all.len() || (width == 0 && rows > 0) {
+                return Err(format!("column `{name}` has gaps: {} numbers in {rows} rows", all.len()));
+            }
+            found.push(WideColumn { name, width, numbers: all });
+        }
+        Ok(found)
+    }
+
+    fn of_column(name: &str, column: ColumnReader, rows: usize) -> Result<Vec<f64>, String> {
+        let numbers = match column {
+            ColumnReader::DoubleColumnReader(column) => numbers(column, rows, |x| x),
+            ColumnReader::FloatColumnReader(column) => numbers(column, rows, f64::from),
+            ColumnReader::Int32ColumnReader(column) => numbers(column, rows, f64::from),
+            ColumnReader::Int64ColumnReader(column) => numbers(column, rows, |x| x as f64),
+            _ => return Err(format!("column `{name}` holds no numbers")),
+        };
+        numbers.map_err(|error| format!("column `{name}`: {}", said(error)))
+    }
+
     fn numbers<T: DataType>(
         mut column: ColumnReaderImpl<T>,
         rows: usize,
         number: impl Fn(T::T) -> f64,
     ) -> Result<Vec<f64>, ParquetError> {
-        let (mut values, mut levels, mut read) = (Vec::new(), Vec::new(), 0);
+        let (mut values, mut levels, mut repeated, mut read) = (Vec::new(), Vec::new(), Vec::new(), 0);
         while read < rows {
-            let (more, ..) = column.read_records(rows - read, Some(&mut levels), None, &mut values)?;
+            let (more, ..) = column.read_records(rows - read, Some(&mut levels), Some(&mut repeated), &mut values)?;
             if more == 0 {
                 break;
             }

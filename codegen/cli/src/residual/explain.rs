@@ -96,7 +96,7 @@ fn signs(log: &AlignedLog, residuals: &ResidualTorques) -> Vec<Vec<f64>> {
 type CarriedRows = Vec<Vec<[f64; 10]>>;
 
 /// A fit, and what it leaves.
-struct Solved {
+struct ExplainedFit {
     found: Fitted,
     /// Columns of the payload in front.
     offset: usize,
@@ -127,7 +127,7 @@ pub fn explain(log: &AlignedLog, residuals: &ResidualTorques, payload: Option<&U
         }
         solved = solve(log, residuals, &signs, &rows, carried.as_ref());
     }
-    let Solved { found, offset, payload, left } = solved;
+    let ExplainedFit { found, offset, payload, left } = solved;
     let joints = (0..qd.len()).map(|j| joint_figure(log, residuals, j, (&found, offset), &left[j])).collect();
     let named = |k: &usize| match k.checked_sub(offset) {
         None => (None, PAYLOAD_PARAMETERS[*k]),
@@ -144,7 +144,7 @@ fn solve(
     signs: &[Vec<f64>],
     rows: &[usize],
     carried: Option<&CarriedRows>,
-) -> Solved {
+) -> ExplainedFit {
     let mut found = fitted(rows, residuals, signs, carried);
     let payload = carried.map(|_| payload_figure(&found));
     let used = carried.filter(|_| payload.as_ref().is_some_and(|figure| figure.is_found));
@@ -153,7 +153,7 @@ fn solve(
     }
     let offset = if used.is_some() { CARRIED } else { 0 };
     let left = left_over(log, residuals, (rows, used), (&found.coefficients, offset), signs);
-    Solved { found, offset, payload, left }
+    ExplainedFit { found, offset, payload, left }
 }
 
 /// One fit of all joints: the columns of the payload, if any, then those of each joint.

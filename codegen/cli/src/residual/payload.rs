@@ -1,8 +1,8 @@
 //! What a frame carries in addition: ten parameters that torques are linear in.
 
 use super::torques::StateColumns;
-use straightline_core::model::{Frame, JointEffects, Load, Model};
-use straightline_core::spatial::{Mat3, SpatialInertia, Sym3, Vec3};
+use straightline_core::model::{JointEffects, Load, Model};
+use straightline_core::spatial::SpatialInertia;
 
 /// Names of the parameters, of a payload in its frame: mass \[kg\], first moments \[kg·m\], second moments ∫ r rᵀ dm \[kg·m²\].
 pub const PAYLOAD_PARAMETERS: [&str; 10] =
@@ -12,25 +12,6 @@ pub const PAYLOAD_PARAMETERS: [&str; 10] =
 #[derive(Clone, Debug)]
 pub struct UnitPayloads {
     models: Vec<Model<f64>>,
-}
-
-/// One unit of a parameter, in the frame's axes about its origin.
-fn unit(k: usize) -> Load<f64> {
-    let is = |j: usize| if j == k { 1.0 } else { 0.0 };
-    Load {
-        mass: is(0),
-        first_moment: Vec3::from([is(1), is(2), is(3)]),
-        second_moment: Sym3 { xx: is(4), xy: is(5), xz: is(6), yy: is(7), yz: is(8), zz: is(9) },
-    }
-}
-
-/// A load in a frame, as its body's canonical frame has it: r = t + R r', so that Σ = R Σ' Rᵀ + R h tᵀ + t (R h)ᵀ + m t tᵀ.
-fn placed(load: Load<f64>, frame: &Frame<f64>) -> Load<f64> {
-    let (rotation, t) = (&frame.placement.rotation, frame.placement.translation);
-    let h = *rotation * load.first_moment;
-    let turned = *rotation * load.second_moment.to_matrix() * rotation.transpose();
-    let second = turned + Mat3::outer(h, t) + Mat3::outer(t, h) + Mat3::outer(t, t.scale(load.mass));
-    Load { mass: load.mass, first_moment: h + t.scale(load.mass), second_moment: Sym3::from_matrix(&second) }
 }
 
 impl UnitPayloads {
@@ -46,7 +27,7 @@ impl UnitPayloads {
         }
         let carrying = |k: usize| {
             let mut model = bare.clone();
-            model.bodies[body].carry(placed(unit(k), frame));
+            model.bodies[body].carry(Load::unit(k).seen_from(&frame.placement));
             model
         };
         Some(UnitPayloads { models: (0..PAYLOAD_PARAMETERS.len()).map(carrying).collect() })

@@ -33,14 +33,8 @@ impl TorqueModel {
     /// # Errors
     /// What the compiler says of file and scene.
     pub fn load(source: &Source, options: &Options) -> Result<TorqueModel, LoadError> {
-        let mut options = Options { optimise: OptimisationTier::Quick, ..options.clone() };
-        options.functions = [&[Function::InverseDynamics], &OF_OBSERVER[..]].concat();
-        options.scene.outputs.clear();
-        options.scene.parameters.clear();
-        options.scene.budgets.clear();
-        options.scene.zero = Zero::default();
-        options.scene.staged = false;
-        let robot = Robot::load(source, &options)?;
+        let functions = [&[Function::InverseDynamics], &OF_OBSERVER[..]].concat();
+        let robot = Robot::load(source, &of_the_robot(options, functions))?;
         let model = robot.model().cast();
         Ok(TorqueModel { robot, model })
     }
@@ -52,14 +46,7 @@ impl TorqueModel {
 
     /// Why the robot has no residuals by a log of its joints, if so.
     pub fn refusal(&self) -> Option<String> {
-        if self.model.floats() {
-            return Some("its base floats: a log of joints does not say how it moves".to_string());
-        }
-        if !self.model.closure.is_empty() {
-            return Some("it has closed loops".to_string());
-        }
-        let other = self.model.joints().into_iter().find(|joint| !joint.kind.is_single())?;
-        Some(format!("joint `{}` has several coordinates, of which messages have no place", other.name))
+        refusal(&self.model)
     }
 
     /// The names of the joints, in the order of the coordinates.
@@ -132,8 +119,31 @@ impl TorqueModel {
     }
 }
 
+/// Options for functions of the whole robot: of a scene count what the robot is and carries, not what is left out of functions.
+pub(crate) fn of_the_robot(options: &Options, functions: Vec<Function>) -> Options {
+    let mut options = Options { optimise: OptimisationTier::Quick, functions, ..options.clone() };
+    options.scene.outputs.clear();
+    options.scene.parameters.clear();
+    options.scene.budgets.clear();
+    options.scene.zero = Zero::default();
+    options.scene.staged = false;
+    options
+}
+
+/// Why a log of joints says nothing of a robot's forces, if so.
+pub(crate) fn refusal(model: &Model<f64>) -> Option<String> {
+    if model.floats() {
+        return Some("its base floats: a log of joints does not say how it moves".to_string());
+    }
+    if !model.closure.is_empty() {
+        return Some("it has closed loops".to_string());
+    }
+    let other = model.joints().into_iter().find(|joint| !joint.kind.is_single())?;
+    Some(format!("joint `{}` has several coordinates, of which messages have no place", other.name))
+}
+
 /// The results of a function for some states, entry after entry.
-fn evaluated(function: &LoadedFunction<f64>, inputs: &[&StateColumns], range: Range<usize>) -> Vec<f64> {
+pub(crate) fn evaluated(function: &LoadedFunction<f64>, inputs: &[&StateColumns], range: Range<usize>) -> Vec<f64> {
     let (count, layout) = (range.len(), BatchLayout::entries_of(range.len()));
     let gathered: Vec<Vec<f64>> = inputs
         .iter()

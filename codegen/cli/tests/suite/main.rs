@@ -9,7 +9,13 @@ mod drive_parameters;
 mod export;
 #[cfg(feature = "parquet")]
 mod fuzz;
+#[cfg(feature = "logs")]
+mod identify;
 mod in_c;
+#[cfg(all(feature = "logs", feature = "parquet"))]
+mod lerobot;
+#[cfg(feature = "logs")]
+mod logged;
 #[cfg(feature = "parquet")]
 mod machine_code;
 #[path = "../../../../generated_tests/src/made.rs"]

@@ -1,6 +1,6 @@
 //! The command `residuals`: what was hidden in a log is found, and nothing where nothing was.
 
-use std::f64::consts::TAU;
+use crate::logged::{csv, logged, motion, Normal};
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
@@ -9,7 +9,6 @@ use straightline_cli::residual::torques::TorqueModel;
 use straightline_cli::residual::{explain, residual_torques};
 use straightline_codegen::diagnostic::Source;
 use straightline_codegen::options::Options;
-use straightline_core::algorithms::inverse_dynamics;
 use straightline_core::model::{Load, Model};
 use straightline_core::spatial::{Mat3, Sym3, Vec3};
 use straightline_logs::align::align;
@@ -47,52 +46,6 @@ fn panda() -> (String, TorqueModel) {
     (path, TorqueModel::load(&source, &Options::default()).expect("the robot can be loaded"))
 }
 
-/// A motion that excites all joints: position, velocity and acceleration of joint `k` at a time, three sines of its own.
-fn motion(k: usize, t: f64) -> [f64; 3] {
-    let middle = [0.1, -0.4, 0.2, -1.8, 0.1, 1.9, 0.6][k % 7];
-    (0..3).fold([middle, 0.0, 0.0], |[q, qd, qdd], n| {
-        let (size, w) = (0.42 / (n + 1) as f64, TAU * (0.11 + 0.07 * k as f64) * (0.6 + 0.55 * n as f64));
-        let angle = w * t + (k * 3 + n) as f64;
-        [q + size * angle.sin(), qd + size * w * angle.cos(), qdd - size * w * w * angle.sin()]
-    })
-}
-
-/// Columns of a table over time: t, and per joint q, qd, qdd, and the torques of a model.
-fn logged(model: &Model<f64>, times: &[f64]) -> Vec<(String, Vec<f64>)> {
-    let nv = model.nv();
-    let mut columns = vec![Vec::with_capacity(times.len()); 4 * nv];
-    for t in times {
-        let states: Vec<[f64; 3]> = (0..nv).map(|k| motion(k, *t)).collect();
-        let [q, qd, qdd] = [0, 1, 2].map(|n| states.iter().map(|s| s[n]).collect::<Vec<f64>>());
-        let tau = inverse_dynamics(model, &q, &qd, &qdd);
-        columns.iter_mut().zip([q, qd, qdd, tau].concat()).for_each(|(column, x)| column.push(x));
-    }
-    let joints: Vec<String> = model.joints().iter().map(|joint| joint.name.clone()).collect();
-    let names = ["q", "qd", "qdd", "tau"].iter().flat_map(|p| joints.iter().map(move |j| format!("{p}.{j}")));
-    std::iter::once(("t".to_string(), times.to_vec())).chain(names.zip(columns)).collect()
-}
-
-fn csv(columns: &[(String, Vec<f64>)]) -> String {
-    let head = columns.iter().map(|c| c.0.clone()).collect::<Vec<_>>().join(",");
-    let row = |i: usize| columns.iter().map(|c| format!("{:?}", c.1[i])).collect::<Vec<_>>().join(",");
-    let rows: Vec<String> = (0..columns[0].1.len()).map(row).collect();
-    format!("{head}\n{}\n", rows.join("\n"))
-}
-
-/// Normal numbers, by twelve uniform ones.
-struct Normal(u64);
-
-impl Normal {
-    fn next(&mut self) -> f64 {
-        let mut sum = -6.0;
-        for _ in 0..12 {
-            self.0 = self.0.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
-            sum += (self.0 >> 11) as f64 / (1u64 << 53) as f64;
-        }
-        sum
-    }
-}
-
 #[test]
 fn a_log_without_noise_leaves_nothing_in_both_ways() {
     let (robot, model) = panda();
@@ -108,9 +61,9 @@ fn a_log_without_noise_leaves_nothing_in_both_ways() {
     assert!(said.contains("no payload at ") && said.contains("no episodes"), "{said}");
     let text = fs::read_to_string(&output).expect("residuals");
     let names: Vec<&str> = text.lines().next().expect("a head").split(',').collect();
-    assert_eq!(names.len(), 1 + 3 * 7);
+    assert_eq!(names.len(), 1 + 6 * 7);
     for (row, line) in text.lines().skip(1).enumerate() {
-        for (name, x) in names.iter().zip(line.split(',')).skip(1) {
+        for (name, x) in names.iter().zip(line.split(',')).skip(1 + 3 * 7) {
             let x: f64 = x.parse().expect("a number");
             assert!(x.abs() < 1e-9, "{name} in row {row}: {x}");
         }
@@ -203,12 +156,26 @@ fn a_simulation_written_as_mcap_goes_back_into_residuals() {
             text.lines().skip(1).map(|line| line.split(',').map(|x| x.parse().expect("a number")).collect()).collect();
         assert_eq!(rows.len(), 1001);
         for row in rows.iter().filter(|row| (0.3..0.7).contains(&row[0])) {
-            assert!(row[1..3].iter().all(|x| x.abs() < 1e-5) && row[3..5].iter().all(|x| x.abs() < 1e-8), "{row:?}");
+            assert!(row[7..9].iter().all(|x| x.abs() < 1e-5) && row[9..11].iter().all(|x| x.abs() < 1e-8), "{row:?}");
         }
         said
     });
     assert!(said[0].contains("1001 of 1001 rows, 1000 Hz") && said[0].contains("no episodes"), "{}", said[0]);
     assert!(said[1].contains("not read: energy, work, losses"), "{}", said[1]);
+    // frames stand where kinematics say, and pages draw the log, and the residuals
+    let poses = mcap::frame_poses(&fs::read(&log).expect("the log")).expect("poses");
+    let tip = poses.iter().find(|pose| pose.child == "tip").expect("the tip");
+    let (a, b) = (0.3_f64, 0.3 - 0.2_f64);
+    let wanted = [0.5 * a.cos() + 0.4 * b.cos(), 0.0, 0.5 * a.sin() + 0.4 * b.sin()];
+    for (found, wanted) in tip.translation.iter().zip(wanted) {
+        assert!((found - wanted).abs() < 1e-15, "{tip:?}");
+    }
+    let page = scratch("run.html").display().to_string();
+    for run in [&log, &table] {
+        succeeds(&["view", &robot, run, "-o", &page]);
+        let page = fs::read_to_string(&page).expect("a page");
+        assert_eq!(page.contains("Residual torques"), run == &table);
+    }
 }
 
 #[test]

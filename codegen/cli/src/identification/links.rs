@@ -1,0 +1,194 @@
+//! How base parameters are made of what a robot file says of links and joints.
+
+use super::regressor::RegressorModel;
+use straightline_codegen::convert::renumber::NewInertial;
+use straightline_codegen::description::{Description, WrittenInertial};
+use straightline_core::base_parameters::{JointParameter, PER_BODY};
+use straightline_core::model::{Load, Model};
+use straightline_core::spatial::{Sym3, Vec3};
+use straightline_core::Dd;
+use straightline_logs::consistent::{is_body, thickened};
+
+/// Moments about the centre of mass are at least those of a ball that small \[m\].
+const THINNEST: f64 = 1e-3;
+/// Digits that are written.
+const DIGITS: usize = 9;
+/// What is nothing, as a part of the numbers beside it.
+const DUST: f64 = 1e-9;
+
+/// A link whose numbers are looked for.
+#[derive(Clone, Debug, PartialEq)]
+pub struct IdentifiedLink {
+    /// Its name.
+    pub name: String,
+    /// m, m c, I about the origin of its frame, in its axes, as the file has them.
+    pub written: [f64; PER_BODY],
+    /// The nearest that a body can have.
+    pub known: [f64; PER_BODY],
+}
+
+/// How base parameters are made.
+#[derive(Clone, Debug, PartialEq)]
+pub struct LinkMap {
+    /// Links with mass that move.
+    pub links: Vec<IdentifiedLink>,
+    /// Joints' parameters: joint, kind, and value by the file.
+    pub joints: Vec<(usize, JointParameter, f64)>,
+    /// Rows of a number per base parameter: ten columns per link, then one per parameter of a joint.
+    pub made_of: Vec<Vec<f64>>,
+    /// What is added: of masses that are not looked for.
+    pub rest: Vec<f64>,
+}
+
+/// m, m c, I about the origin of the frame, in its axes.
+fn parameters(load: &Load<Dd>) -> [Dd; PER_BODY] {
+    let (c, i) = (load.first_moment, load.second_moment.second_moment_to_inertia());
+    [load.mass, c.x, c.y, c.z, i.xx, i.xy, i.xz, i.yy, i.yz, i.zz]
+}
+
+fn written(inertial: &WrittenInertial) -> [f64; PER_BODY] {
+    let turn = inertial.turn();
+    let (m, c) = (inertial.mass.value, inertial.com.value);
+    let about_com = inertial.inertia.value.rotated(&turn);
+    let [x, y, z] = c;
+    [
+        m,
+        m * x,
+        m * y,
+        m * z,
+        about_com.xx + m * (y * y + z * z),
+        about_com.xy - m * x * y,
+        about_com.xz - m * x * z,
+        about_com.yy + m * (x * x + z * z),
+        about_com.yz - m * y * z,
+        about_com.zz + m * (x * x + y * y),
+    ]
+}
+
+impl LinkMap {
+    /// The links of a description whose robot this is.
+    pub fn of(robot: &RegressorModel, description: &Description) -> LinkMap {
+        let model = &robot.exact;
+        let link = |link: &straightline_codegen::description::WrittenLink| {
+            let name = link.name.value.clone();
+            model.frame(&name)?.body?;
+            let written = written(link.inertial.as_ref()?);
+            let known = if is_body(&written) { written } else { thickened(&written, THINNEST)? };
+            Some(IdentifiedLink { name, written, known })
+        };
+        let links: Vec<IdentifiedLink> = description.links.iter().filter_map(link).collect();
+        let joints = joints(model, &robot.kinds);
+        let columns = columns(model, &links, joints.len());
+        let made_of: Vec<Vec<f64>> = robot
+            .parameters()
+            .iter()
+            .map(|parameter| columns.iter().map(|column| parameter.value(column).to_f64()).collect())
+            .collect();
+        let by_file = |row: &Vec<f64>| {
+            let numbers = links.iter().flat_map(|link| link.written).chain(joints.iter().map(|joint| joint.2));
+            row.iter().zip(numbers).map(|(y, x)| y * x).sum::<f64>()
+        };
+        let rest = robot.nominal.iter().zip(&made_of).map(|(value, row)| value - by_file(row)).collect();
+        LinkMap { links, joints, made_of, rest }
+    }
+
+    /// Base parameters of these links and parameters of joints.
+    pub fn base_parameters(&self, bodies: &[[f64; PER_BODY]], joints: &[f64]) -> Vec<f64> {
+        let value = |(row, rest): (&Vec<f64>, &f64)| {
+            let numbers = bodies.iter().flatten().chain(joints);
+            rest + row.iter().zip(numbers).map(|(y, x)| y * x).sum::<f64>()
+        };
+        self.made_of.iter().zip(&self.rest).map(value).collect()
+    }
+}
+
+/// The parameters of joints, kind by kind, as base parameters are made of them.
+fn joints(model: &Model<Dd>, kinds: &[JointParameter]) -> Vec<(usize, JointParameter, f64)> {
+    let mut bodies: Vec<_> = model.bodies.iter().collect();
+    bodies.sort_by_key(|body| body.joint.iv);
+    let of_kind = |kind: &JointParameter| {
+        let kind = *kind;
+        bodies
+            .iter()
+            .enumerate()
+            .map(move |(j, body)| (j, kind, kind.value(&body.effects).to_f64()))
+            .collect::<Vec<_>>()
+    };
+    kinds.iter().flat_map(of_kind).collect()
+}
+
+/// What base parameters are made of, for a unit of each parameter of the links in turn, then of each joint's.
+fn columns(model: &Model<Dd>, links: &[IdentifiedLink], joints: usize) -> Vec<Vec<Dd>> {
+    let mut order: Vec<usize> = (0..model.bodies.len()).collect();
+    order.sort_by_key(|body| model.bodies[*body].joint.iv);
+    let length = PER_BODY * model.bodies.len();
+    let nothing = vec![Dd::ZERO; length + joints];
+    let mut columns = Vec::with_capacity(PER_BODY * links.len() + joints);
+    for link in links {
+        let frame = model.frame(&link.name).expect("links that move have frames");
+        let body = frame.body.expect("it moves");
+        let rank = order.iter().position(|own| *own == body).expect("all bodies are there");
+        for k in 0..PER_BODY {
+            let unit = inertia_unit(k).seen_from(&frame.placement).seen_from(&model.bodies[body].link_frame.inverse());
+            let mut column = nothing.clone();
+            column[PER_BODY * rank..][..PER_BODY].copy_from_slice(&parameters(&unit));
+            columns.push(column);
+        }
+    }
+    columns.extend((0..joints).map(|k| {
+        let mut column = nothing.clone();
+        column[length + k] = Dd::ONE;
+        column
+    }));
+    columns
+}
+
+/// A unit of m, of a first moment, or of an entry of the inertia.
+fn inertia_unit(k: usize) -> Load<Dd> {
+    let is = |j: usize| if j == k { Dd::ONE } else { Dd::ZERO };
+    let inertia = Sym3 { xx: is(4), xy: is(5), xz: is(6), yy: is(7), yz: is(8), zz: is(9) };
+    let half_trace = Dd::HALF * (inertia.xx + inertia.yy + inertia.zz);
+    let second_moment = Sym3 {
+        xx: half_trace - inertia.xx,
+        yy: half_trace - inertia.yy,
+        zz: half_trace - inertia.zz,
+        xy: -inertia.xy,
+        xz: -inertia.xz,
+        yz: -inertia.yz,
+    };
+    Load { mass: is(0), first_moment: Vec3::new(is(1), is(2), is(3)), second_moment }
+}
+
+/// Rounded to the digits that are written.
+pub fn rounded(x: f64) -> f64 {
+    format!("{x:.*e}", DIGITS - 1).parse().unwrap_or(x)
+}
+
+/// Zero in place of what is nothing beside numbers of this size.
+fn no_dust(x: f64, size: f64) -> f64 {
+    if x.abs() < DUST * size {
+        0.0
+    } else {
+        x
+    }
+}
+
+/// What a file is to have for a link.
+pub fn new_inertial(link: &str, body: &[f64; PER_BODY]) -> NewInertial {
+    let [m, hx, hy, hz, xx, xy, xz, yy, yz, zz] = *body;
+    let mass = rounded(m);
+    let length = hx.hypot(hy).hypot(hz) / m;
+    let com = [hx, hy, hz].map(|h| no_dust(rounded(h / m), length));
+    // about the centre of mass that is written: I − m (c·c 1 − c cᵀ)
+    let [x, y, z] = com;
+    let inertia = Sym3 {
+        xx: xx - mass * (y * y + z * z),
+        xy: xy + mass * x * y,
+        xz: xz + mass * x * z,
+        yy: yy - mass * (x * x + z * z),
+        yz: yz + mass * y * z,
+        zz: zz - mass * (x * x + y * y),
+    };
+    let size = inertia.xx + inertia.yy + inertia.zz;
+    NewInertial { link: link.to_string(), mass, com, inertia: inertia.map(|x| no_dust(rounded(x), size)) }
+}
