@@ -131,7 +131,7 @@ mod known {
                 all.extend(of_column(&name, group.get_column_reader(k).map_err(said)?, own)?);
                 rows += own;
             }
-            let width = if rows == 0 { 0 } else { all.len() / rows };
+            let width = all.len().checked_div(rows).unwrap_or(0);
             if width * rows != all.len() || (width == 0 && rows > 0) {
                 return Err(format!("column `{name}` has gaps: {} numbers in {rows} rows", all.len()));
             }
