@@ -23,13 +23,13 @@ impl Noise {
     }
 
     /// Uniform from 0 to 1.
-    pub fn from_zero(&mut self) -> f64 {
+    pub fn positive(&mut self) -> f64 {
         0.5 * (self.uniform() + 1.0)
     }
 
     /// Of a normal distribution with variance 1, as sums of twelve are.
     pub fn normal(&mut self) -> f64 {
-        (0..12).map(|_| self.from_zero()).sum::<f64>() - 6.0
+        (0..12).map(|_| self.positive()).sum::<f64>() - 6.0
     }
 }
 

@@ -72,9 +72,9 @@ fn instants_far_from_all_else_are_left_out() {
 
 /// Boxes with some mass, some way from the origin.
 fn block(random: &mut Noise) -> [f64; 10] {
-    let m = 0.5 + 3.0 * random.from_zero();
-    let [x, y, z] = [0; 3].map(|_| 0.4 * (random.from_zero() - 0.5));
-    let [a, b, c] = [0; 3].map(|_| m * (0.02 + 0.05 * random.from_zero()).powi(2));
+    let m = 0.5 + 3.0 * random.positive();
+    let [x, y, z] = [0; 3].map(|_| 0.4 * (random.positive() - 0.5));
+    let [a, b, c] = [0; 3].map(|_| m * (0.02 + 0.05 * random.positive()).powi(2));
     let (xx, yy, zz) = (b + c + m * (y * y + z * z), a + c + m * (x * x + z * z), a + b + m * (x * x + y * y));
     [m, m * x, m * y, m * z, xx, -m * x * y, -m * x * z, yy, -m * y * z, zz]
 }
@@ -123,7 +123,7 @@ fn what_is_found_is_the_least() {
     let mut random = Noise(11);
     let known = [block(&mut random), block(&mut random), block(&mut random)];
     // combinations of parameters, fewer than these
-    let made_of: Vec<Vec<f64>> = (0..12).map(|_| (0..31).map(|_| random.from_zero() - 0.5).collect()).collect();
+    let made_of: Vec<Vec<f64>> = (0..12).map(|_| (0..31).map(|_| random.positive() - 0.5).collect()).collect();
     let rest: Vec<f64> = (0..12).map(|_| random.normal()).collect();
     let mut squares = LeastSquares::new(12);
     for _ in 0..40 {
