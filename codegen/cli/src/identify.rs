@@ -57,7 +57,7 @@ pub struct Identify {
     /// Write a motion that excites all parameters, within the limits of the joints, in place of all else: as CSV, JSON or Parquet, as its name ends
     #[arg(long, value_name = "FILE", conflicts_with_all = ["logs", "validate", "topic", "cutoff", "output"])]
     pub design: Option<PathBuf>,
-    /// The period of that motion \[s\]
+    /// The period of that motion, in seconds
     #[arg(long, value_name = "S", default_value_t = 10.0, value_parser = duration, requires = "design")]
     pub duration: f64,
     /// Seed of the motions from which its search begins
