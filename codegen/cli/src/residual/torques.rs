@@ -7,6 +7,7 @@ use straightline_codegen::options::Options;
 use straightline_codegen::scene::Zero;
 use straightline_codegen::Function;
 use straightline_core::model::Model;
+use straightline_graph::Scalar;
 use straightline_jit::{BatchLayout, LoadError, LoadedFunction, Robot};
 
 /// Columns of numbers: one per coordinate, with a number per state.
@@ -121,7 +122,14 @@ impl TorqueModel {
 
 /// Options for functions of the whole robot: of a scene count what the robot is and carries, not what is left out of functions.
 pub(crate) fn of_the_robot(options: &Options, functions: Vec<Function>) -> Options {
-    let mut options = Options { optimise: OptimisationTier::Quick, functions, ..options.clone() };
+    let mut options = Options {
+        optimise: OptimisationTier::Quick,
+        functions,
+        scalar: Scalar::F64,
+        also: Vec::new(),
+        fixed: None,
+        ..options.clone()
+    };
     options.scene.outputs.clear();
     options.scene.parameters.clear();
     options.scene.budgets.clear();

@@ -14,6 +14,7 @@ use straightline_codegen::model::{load, ModelOptions};
 use straightline_codegen::options::Options;
 use straightline_core::base_parameters::JointParameter;
 use straightline_core::model::Model;
+use straightline_graph::Scalar;
 use straightline_logs::align::{align, AlignedLog};
 use straightline_logs::consistent::is_body;
 use straightline_logs::log::from_columns;
@@ -112,6 +113,17 @@ fn base_parameters_are_made_of_links_alone() {
             assert!(rest.abs() < 1e-13 * (1.0 + value.abs()), "{}: {name}: {rest}", source.path());
         }
     }
+}
+
+/// What else is generated of the robot does not count.
+#[test]
+fn a_scene_in_single_precision_is_identified_in_double() {
+    let source = source_of("planar_2r.toml");
+    let options = Options { scalar: Scalar::F32, ..Options::default() };
+    let (single, double) = (RegressorModel::load(&source, &options), RegressorModel::load(&source, &Options::default()));
+    let (single, double) = (single.expect("the robot can be loaded"), double.expect("the robot can be loaded"));
+    let log = aligned(logged(&double.exact.cast(), &times(0.2, 500.0, 0.0)), &double.joints());
+    assert_eq!(single.equations(std::slice::from_ref(&log), 10.0), double.equations(&[log], 10.0));
 }
 
 #[test]
