@@ -120,7 +120,8 @@ fn base_parameters_are_made_of_links_alone() {
 fn a_scene_in_single_precision_is_identified_in_double() {
     let source = source_of("planar_2r.toml");
     let options = Options { scalar: Scalar::F32, ..Options::default() };
-    let (single, double) = (RegressorModel::load(&source, &options), RegressorModel::load(&source, &Options::default()));
+    let (single, double) =
+        (RegressorModel::load(&source, &options), RegressorModel::load(&source, &Options::default()));
     let (single, double) = (single.expect("the robot can be loaded"), double.expect("the robot can be loaded"));
     let log = aligned(logged(&double.exact.cast(), &times(0.2, 500.0, 0.0)), &double.joints());
     assert_eq!(single.equations(std::slice::from_ref(&log), 10.0), double.equations(&[log], 10.0));
