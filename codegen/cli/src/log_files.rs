@@ -1,5 +1,6 @@
 //! Logs of robots as files, and what is said of them.
 
+use crate::motion::{columns, Columns};
 use crate::{files, lerobot, print, CommandFailure};
 use std::io::Write;
 use std::path::Path;
@@ -15,8 +16,6 @@ use straightline_simulation::html::four_digits;
 use straightline_simulation::table::DataTable;
 use straightline_view::{frame_poses, ViewedRun};
 
-/// Columns by name.
-pub type Columns = Vec<(String, Vec<f64>)>;
 /// The frame in which poses are.
 const WORLD: &str = "world";
 
@@ -61,8 +60,7 @@ fn log(path: &Path, topic: Option<&str>) -> Result<JointLog, CommandFailure> {
         lerobot::read(path)
     } else if parquet::is_parquet(path) {
         let table = parquet::read(path).map_err(|why| print::failure(format!("{}: {why}", path.display())))?;
-        let columns = table.names.iter().enumerate();
-        from_columns(columns.map(|(k, name)| (name.clone(), table.rows.iter().map(|row| row[k]).collect())).collect())
+        from_columns(columns(&table))
     } else {
         let bytes =
             std::fs::read(path).map_err(|e| std::io::Error::new(e.kind(), format!("{}: {e}", path.display())))?;
@@ -80,9 +78,7 @@ fn log(path: &Path, topic: Option<&str>) -> Result<JointLog, CommandFailure> {
 
 /// A table with `t`, `q.`, `qd.` and `tau.` of a robot as MCAP: joint states, and poses of all frames in the world.
 pub fn mcap_bytes(table: &DataTable, model: &Model<f64>) -> Result<Vec<u8>, CommandFailure> {
-    let columns = table.names.iter().enumerate();
-    let columns: Columns =
-        columns.map(|(k, name)| (name.clone(), table.rows.iter().map(|row| row[k]).collect())).collect();
+    let columns = columns(table);
     let run = ViewedRun::of_columns(model, &columns).map_err(|failures| match failures.into_iter().next() {
         Some(failure) => print::failure_with(failure.what, &[failure.help]),
         None => CommandFailure::Input,

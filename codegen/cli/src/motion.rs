@@ -96,6 +96,15 @@ pub fn unreadable(path: &Path, why: &str) -> CommandFailure {
     print::failure(format!("{}: {why}", path.display()))
 }
 
+/// Columns by name.
+pub type Columns = Vec<(String, Vec<f64>)>;
+
+/// The columns of a table.
+pub fn columns(table: &DataTable) -> Columns {
+    let column = |(k, name): (usize, &String)| (name.clone(), table.rows.iter().map(|row| row[k]).collect());
+    table.names.iter().enumerate().map(column).collect()
+}
+
 /// Writes what a robot did, as a log with the poses of its frames where the file's name ends in .mcap, or else as any table.
 pub fn write_run(path: &Path, table: &DataTable, model: &Model<f64>) -> Result<(), CommandFailure> {
     match path.extension().is_some_and(|e| e.eq_ignore_ascii_case("mcap")) {

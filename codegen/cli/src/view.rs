@@ -1,7 +1,7 @@
 //! The command `view`: a robot in motion as a page for the browser.
 
 use crate::arguments::{robot_file, ModelArgs, EXIT_CODES};
-use crate::motion::{experiment, joined, not_analysed, robot, unreadable};
+use crate::motion::{columns, experiment, joined, not_analysed, robot, unreadable};
 use crate::{files, logs, print, CommandFailure};
 use clap::Args;
 use std::path::{Path, PathBuf};
@@ -10,7 +10,6 @@ use straightline_codegen::diagnostic::{Diagnostics, Severity};
 use straightline_core::model::Model;
 use straightline_simulation::analysis::analyze;
 use straightline_simulation::html::four_digits;
-use straightline_simulation::table::DataTable;
 use straightline_view::{page, urdf_look, ViewFailure, ViewedLook, ViewedRun};
 
 /// Time between instants of a motion that is analysed, at most \[s\].
@@ -111,10 +110,7 @@ fn prescribed(path: &Path, model: &Model<f64>) -> Result<ViewedRun, CommandFailu
         return Err(print::failure_with(format!("{} prescribes no motion", path.display()), &help));
     };
     let found = analyze(model, &motion, INTERVAL).map_err(|failure| not_analysed(&failure))?;
-    let DataTable { names, rows } = joined(&found);
-    let columns: Vec<(String, Vec<f64>)> =
-        names.into_iter().enumerate().map(|(k, name)| (name, rows.iter().map(|row| row[k]).collect())).collect();
-    ViewedRun::of_columns(model, &columns).map_err(|failures| refused(Some(path), &failures))
+    ViewedRun::of_columns(model, &columns(&joined(&found))).map_err(|failures| refused(Some(path), &failures))
 }
 
 /// Says all of these.
