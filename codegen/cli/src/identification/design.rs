@@ -122,10 +122,7 @@ impl DesignedMotion {
 /// The robot cannot hold itself within its limits of effort, or no motion tells all parameters apart.
 pub fn designed(robot: &RegressorModel, demand: DesignDemand) -> Result<DesignedMotion, String> {
     let (rooms, assumed) = rooms(robot);
-    let graph = robot.torque_regressor();
-    let slope = |name: &'static str, of: &str| LoadedFunction::of_graph(name, &dead_code(&gradient(graph, of)));
-    let slopes = [slope("slope_q", "q"), slope("slope_qd", "qd"), slope("slope_qdd", "qdd")];
-    let design = MotionDesign { robot, slopes, rooms, duration: demand.duration };
+    let design = MotionDesign::of(robot, rooms, demand.duration);
     let mut random = demand.seed;
     let mut starts: Vec<(f64, Vec<f64>)> = Vec::new();
     for _ in 0..RANDOM {
@@ -182,7 +179,13 @@ fn beyond(x: f64, limit: f64) -> Option<(f64, f64)> {
     (ratio > 1.0).then(|| (ratio - 1.0, x.signum() / (WITHIN * limit)))
 }
 
-impl MotionDesign<'_> {
+impl<'a> MotionDesign<'a> {
+    fn of(robot: &'a RegressorModel, rooms: Vec<JointRoom>, duration: f64) -> MotionDesign<'a> {
+        let graph = robot.torque_regressor();
+        let slopes = ["q", "qd", "qdd"].map(|of| LoadedFunction::of_graph("slope", &dead_code(&gradient(graph, of))));
+        MotionDesign { robot, slopes, rooms, duration }
+    }
+
     /// Coefficients of this size move a joint through its room.
     fn units(&self) -> impl Iterator<Item = f64> + '_ {
         self.rooms.iter().flat_map(|room| (0..PER_JOINT).map(|k| if k == 0 { 0.3 * room.half } else { room.half }))
@@ -315,12 +318,9 @@ mod tests {
         let path = concat!(env!("CARGO_MANIFEST_DIR"), "/../../robots/descriptions/planar_2r.toml");
         let source = Source::new(path, std::fs::read_to_string(path).expect("the robot file"));
         let robot = RegressorModel::load(&source, &Options::default()).expect("the robot can be loaded");
-        let graph = robot.torque_regressor();
-        let slope = |of: &str| LoadedFunction::of_graph("slope", &dead_code(&gradient(graph, of)));
-        let slopes = [slope("q"), slope("qd"), slope("qdd")];
         let (mut rooms, _) = rooms(&robot);
         rooms.iter_mut().for_each(|room| (room.velocity, room.effort) = (2.0, 12.0));
-        let design = MotionDesign { robot: &robot, slopes, rooms, duration: 4.0 };
+        let design = MotionDesign::of(&robot, rooms, 4.0);
         let at = design.drawn(&mut 7);
         let (value, found) = design.cost(&at, 10.0);
         assert!(value > design.condition(&at).ln() + 1e-3, "limits are exceeded: {value}");

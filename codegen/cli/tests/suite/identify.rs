@@ -1,9 +1,8 @@
 //! The command `identify`: equations are exact, intervals hold, what is written can be and is the robot, and what logs cannot tell stays.
 
-use crate::logged::{csv, logged, motion, Normal};
+use crate::logged::{self, csv, logged, motion, straightline, Normal};
 use std::fs;
-use std::path::{Path, PathBuf};
-use std::process::{Command, Output};
+use std::path::PathBuf;
 use straightline_cli::identification::{
     designed, identified, lags, rounded, together, DesignDemand, LinkMap, RegressorModel,
 };
@@ -22,13 +21,7 @@ use straightline_logs::log::from_columns;
 const ROBOTS: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../../robots/descriptions");
 
 fn scratch(name: &str) -> PathBuf {
-    let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join("identify");
-    fs::create_dir_all(&folder).expect("a folder of the tests");
-    folder.join(name)
-}
-
-fn straightline(arguments: &[&str]) -> Output {
-    Command::new(env!("CARGO_BIN_EXE_straightline")).args(arguments).output().expect("it starts")
+    logged::scratch("identify", name)
 }
 
 fn source_of(robot: &str) -> Source {

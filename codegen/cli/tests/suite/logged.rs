@@ -1,8 +1,23 @@
-//! Logs of motions that excite all joints, as tests make them.
+//! Logs of motions that excite all joints, as tests make them, and the command that reads them.
 
 use std::f64::consts::TAU;
+use std::fs;
+use std::path::{Path, PathBuf};
+use std::process::{Command, Output};
 use straightline_core::algorithms::inverse_dynamics;
 use straightline_core::model::Model;
+
+/// A file of these tests.
+pub fn scratch(tests: &str, name: &str) -> PathBuf {
+    let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join(tests);
+    fs::create_dir_all(&folder).expect("a folder of the tests");
+    folder.join(name)
+}
+
+/// The command with these arguments.
+pub fn straightline(arguments: &[&str]) -> Output {
+    Command::new(env!("CARGO_BIN_EXE_straightline")).args(arguments).output().expect("it starts")
+}
 
 /// A motion that excites all joints: position, velocity and acceleration of joint `k` at a time, three sines of its own.
 pub fn motion(k: usize, t: f64) -> [f64; 3] {

@@ -1,9 +1,8 @@
 //! The command `residuals`: what was hidden in a log is found, and nothing where nothing was.
 
-use crate::logged::{csv, logged, motion, Normal};
+use crate::logged::{self, csv, logged, motion, straightline, Normal};
 use std::fs;
-use std::path::{Path, PathBuf};
-use std::process::{Command, Output};
+use std::path::PathBuf;
 use straightline_cli::residual::payload::UnitPayloads;
 use straightline_cli::residual::torques::TorqueModel;
 use straightline_cli::residual::{explain, residual_torques};
@@ -18,13 +17,7 @@ use straightline_logs::mcap;
 const ROBOTS: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../../robots");
 
 fn scratch(name: &str) -> PathBuf {
-    let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join("residuals");
-    fs::create_dir_all(&folder).expect("a folder of the tests");
-    folder.join(name)
-}
-
-fn straightline(arguments: &[&str]) -> Output {
-    Command::new(env!("CARGO_BIN_EXE_straightline")).args(arguments).output().expect("it starts")
+    logged::scratch("residuals", name)
 }
 
 fn succeeds(arguments: &[&str]) -> String {
