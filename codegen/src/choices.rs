@@ -238,12 +238,12 @@ choices! {
     }
 }
 
-#[cfg(test)]
-mod tests {
+#[cfg(feature = "internals")]
+#[doc(hidden)]
+pub mod tests {
     use super::*;
 
-    #[test]
-    fn every_word_means_what_it_says() {
+    pub fn every_word_means_what_it_says() {
         fn all<C: Choice + fmt::Debug>() {
             for (word, meaning, choice) in C::words() {
                 assert_eq!(C::from_word(word), Ok(choice));
@@ -264,14 +264,12 @@ mod tests {
         all::<Memory>();
     }
 
-    #[test]
-    fn an_unknown_word_is_answered_with_the_known_ones() {
+    pub fn an_unknown_word_is_answered_with_the_known_ones() {
         let error = Scalar::from_word("half").unwrap_err();
         assert_eq!(error.to_string(), "there is no scalar `half`; one of: f64, f32");
     }
 
-    #[test]
-    fn a_word_that_is_nearly_known_or_known_elsewhere_is_answered_with_the_one_that_is_meant() {
+    pub fn a_word_that_is_nearly_known_or_known_elsewhere_is_answered_with_the_one_that_is_meant() {
         for (word, meant) in
             [("inverse_dynamic", "inverse_dynamics"), ("RNEA", "inverse_dynamics"), ("aba", "forward_dynamics")]
         {
@@ -281,8 +279,7 @@ mod tests {
     }
 
     /// What is certified is proven; what agrees on many states is tested.
-    #[test]
-    fn the_documents_say_proven_of_bounds_and_tested_of_tests() {
+    pub fn the_documents_say_proven_of_bounds_and_tested_of_tests() {
         for name in [
             "README.md",
             "ARCHITECTURE.md",

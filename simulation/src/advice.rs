@@ -210,12 +210,12 @@ fn digits(x: f64, count: i32, round: fn(f64) -> f64) -> f64 {
     format!("{:.*}", (scale.log10().round().max(0.0)) as usize, whole / scale).parse().unwrap_or(whole / scale)
 }
 
-#[cfg(test)]
-mod tests {
+#[cfg(feature = "internals")]
+#[doc(hidden)]
+pub mod tests {
     use super::*;
 
-    #[test]
-    fn digits_are_rounded_away_from_one() {
+    pub fn digits_are_rounded_away_from_one() {
         assert_eq!(digits(1.2341, 3, f64::ceil), 1.24);
         assert_eq!(digits(0.12399, 3, f64::floor), 0.123);
         assert_eq!(digits(15.03, 3, f64::ceil), 15.1);

@@ -24,3 +24,18 @@ pub mod plot;
 mod quadrature;
 pub mod simulate;
 pub mod table;
+
+/// What modules test of themselves, for `tests/suite/inside.rs`. As unit tests they would be a second build of the package.
+#[cfg(feature = "internals")]
+#[doc(hidden)]
+pub mod internals {
+    pub use crate::advice::tests as advice;
+    pub use crate::gains::linear::tests as gains_linear;
+    pub use crate::gains::margins::tests as gains_margins;
+    pub use crate::motion::tests as motion;
+    pub use crate::ode::tests as ode;
+    pub use crate::optimize::tests as optimize;
+    pub use crate::panel::tests as panel;
+    pub use crate::plot::tests as plot;
+    pub use crate::quadrature::tests as quadrature;
+}

@@ -339,8 +339,9 @@ fn quintic_piece(h: f64, [q0, v0, a0]: [f64; 3], [q1, v1, a1]: [f64; 3]) -> Poly
     polynomial([q0, v0, 0.5 * a0, c3 / h.powi(3), c4 / h.powi(4), c5 / h.powi(5)])
 }
 
-#[cfg(test)]
-mod tests {
+#[cfg(feature = "internals")]
+#[doc(hidden)]
+pub mod tests {
     use super::*;
 
     const TIMES: [f64; 4] = [0.0, 0.5, 1.3, 2.0];
@@ -354,8 +355,7 @@ mod tests {
         assert!(a.iter().zip(b).all(|(a, b)| (a - b).abs() < bound), "{a:?} {b:?}");
     }
 
-    #[test]
-    fn splines_go_through_their_points_and_are_smooth() {
+    pub fn splines_go_through_their_points_and_are_smooth() {
         for (motion, smooth_ends) in
             [(Motion::cubic(&TIMES, &points()).unwrap(), false), (Motion::quintic(&TIMES, &points()).unwrap(), true)]
         {
@@ -374,8 +374,7 @@ mod tests {
         }
     }
 
-    #[test]
-    fn velocities_and_accelerations_are_derivatives() {
+    pub fn velocities_and_accelerations_are_derivatives() {
         let knots: Vec<_> = points().iter().map(|p| (p.clone(), vec![p[1], 0.3], vec![-p[0], 0.7])).collect();
         let trapezoidal = Motion::trapezoidal(&points(), &[1.0, 2.0], &[3.0, 4.0]).unwrap();
         for motion in [
@@ -396,8 +395,7 @@ mod tests {
         }
     }
 
-    #[test]
-    fn a_trapezoid_is_as_fast_as_its_slowest_joint_and_no_faster() {
+    pub fn a_trapezoid_is_as_fast_as_its_slowest_joint_and_no_faster() {
         let motion = Motion::trapezoidal(&points(), &[1.0, 2.0], &[3.0, 40.0]).unwrap();
         close(&motion.at(motion.duration()).0, &points()[3], 1e-14);
         let (mut speed, mut acceleration) = (0.0f64, 0.0f64);
@@ -412,8 +410,7 @@ mod tests {
         assert_eq!(Motion::trapezoidal(&points(), &[1.0, f64::INFINITY], &[3.0, 4.0]), Err(NoMotion::NoSpeed(1)));
     }
 
-    #[test]
-    fn what_is_beyond_measure_is_no_motion() {
+    pub fn what_is_beyond_measure_is_no_motion() {
         let points = [vec![0.0], vec![1.0]];
         for times in [[0.0, 1e-300], [-1e308, 1e308]] {
             for motion in [Motion::cubic, Motion::quintic, Motion::smooth] {
@@ -434,8 +431,7 @@ mod tests {
         assert_eq!(Motion::cubic(&[0.0, 1.0], &[vec![1e308], vec![-1e308]]), Err(NoMotion::BeyondMeasure(0)));
     }
 
-    #[test]
-    fn what_is_no_motion_is_said() {
+    pub fn what_is_no_motion_is_said() {
         assert_eq!(Motion::cubic(&[0.0], &[vec![1.0]]), Err(NoMotion::TooFew));
         assert_eq!(Motion::cubic(&[0.0, 0.0], &[vec![1.0], vec![2.0]]), Err(NoMotion::NotLater(1)));
         assert_eq!(Motion::cubic(&[0.0, 1.0], &[vec![1.0], vec![2.0, 1.0]]), Err(NoMotion::Coordinates(1)));

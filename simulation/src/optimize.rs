@@ -303,12 +303,12 @@ impl CostFunction for MotionCost<'_> {
     }
 }
 
-#[cfg(test)]
-mod tests {
+#[cfg(feature = "internals")]
+#[doc(hidden)]
+pub mod tests {
     use super::*;
 
-    #[test]
-    fn slopes_are_those_of_differences() {
+    pub fn slopes_are_those_of_differences() {
         let times = [0.0, 0.1, 0.3, 0.3, 0.7];
         let qd: Vec<Vec<f64>> = (0..5).map(|k| vec![(k as f64).sin() - 0.3, 0.5 - 0.2 * k as f64]).collect();
         let tau: Vec<Vec<f64>> = (0..5).map(|k| vec![2.0 * (1.3 * k as f64).cos(), 0.7 * k as f64 - 1.1]).collect();
@@ -337,8 +337,7 @@ mod tests {
         }
     }
 
-    #[test]
-    fn it_goes_down_into_a_valley_and_to_the_end_of_a_range() {
+    pub fn it_goes_down_into_a_valley_and_to_the_end_of_a_range() {
         // Rosenbrock's valley, with the minimum at (1, 1)
         let valley = |x: &[f64]| {
             let (a, b) = (1.0 - x[0], x[1] - x[0] * x[0]);
@@ -356,8 +355,7 @@ mod tests {
         assert!((found.point[0] - 3.0).abs() < 1e-6, "{found:?}");
     }
 
-    #[test]
-    fn what_has_no_finite_cost_has_no_optimum() {
+    pub fn what_has_no_finite_cost_has_no_optimum() {
         for cost in [f64::INFINITY, f64::NAN] {
             let why = minimise(|_| cost, &[(0.0, 1.0), (2.0, 3.0)]).expect_err("none is best");
             assert!(why.contains("not a finite number"), "{why}");

@@ -151,16 +151,16 @@ fn thinned(line: &[(f64, f64)], x0: f64, x1: f64) -> Vec<(f64, f64)> {
     kept
 }
 
-#[cfg(test)]
-mod tests {
+#[cfg(feature = "internals")]
+#[doc(hidden)]
+pub mod tests {
     use super::*;
 
     fn panel(points: Vec<(f64, f64)>, levels: Vec<f64>) -> String {
         Panel { title: "torque <1>", units: ("s", "N·m"), lines: vec![points], levels }.svg()
     }
 
-    #[test]
-    fn the_axis_ends_where_the_run_ends_and_says_where() {
+    pub fn the_axis_ends_where_the_run_ends_and_says_where() {
         let svg = panel((0..=137).map(|k| (f64::from(k) / 100.0, f64::from(k).sin())).collect(), Vec::new());
         let end = SIZE.0 - MARGINS[1];
         let line = svg.lines().find(|l| l.contains("class=\"line")).unwrap();
@@ -170,8 +170,7 @@ mod tests {
         assert!(svg.contains("torque &lt;1&gt;") && svg.contains(">N·m</text>"), "{svg}");
     }
 
-    #[test]
-    fn marks_next_to_each_other_have_different_numbers() {
+    pub fn marks_next_to_each_other_have_different_numbers() {
         for (low, high) in [(25.0, 25.012), (-0.3, 0.3), (0.0, 1.0), (1e-9, 4e-9), (-2e7, 5e7), (1999.0, 2001.0)] {
             let (step, marks) = ticks(low, high, 4);
             let labels: Vec<String> = marks.iter().map(|x| tick(*x, step)).collect();
@@ -179,23 +178,20 @@ mod tests {
         }
     }
 
-    #[test]
-    fn a_peak_of_one_sample_among_many_is_seen() {
+    pub fn a_peak_of_one_sample_among_many_is_seen() {
         let mut points: Vec<(f64, f64)> = (0..100_000).map(|k| (f64::from(k), 0.0)).collect();
         points[54_321].1 = 7.0;
         let kept = thinned(&points, 0.0, 99_999.0);
         assert!(kept.len() <= 4 * PIECES && kept.contains(&(54_321.0, 7.0)));
     }
 
-    #[test]
-    fn limits_far_beyond_the_lines_do_not_flatten_them() {
+    pub fn limits_far_beyond_the_lines_do_not_flatten_them() {
         let points = vec![(0.0, 0.0), (1.0, 1.0)];
         assert_eq!(panel(points.clone(), vec![-1e3, 1e3]).matches("class=\"limit\"").count(), 0);
         assert_eq!(panel(points, vec![1.5]).matches("class=\"limit\"").count(), 1);
     }
 
-    #[test]
-    fn nothing_and_constants_can_be_drawn() {
+    pub fn nothing_and_constants_can_be_drawn() {
         for points in [Vec::new(), vec![(0.0, f64::NAN)], vec![(1.0, 2.0)], vec![(0.0, 5.0), (1.0, 5.0)]] {
             let svg = panel(points, Vec::new());
             assert!(!svg.contains("NaN") && !svg.contains("inf"), "{svg}");

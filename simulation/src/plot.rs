@@ -115,8 +115,9 @@ impl Plot<'_> {
     }
 }
 
-#[cfg(test)]
-mod tests {
+#[cfg(feature = "internals")]
+#[doc(hidden)]
+pub mod tests {
     use super::*;
 
     /// The greatest x of the polylines of that width.
@@ -128,8 +129,7 @@ mod tests {
         numbers.fold(f64::NEG_INFINITY, f64::max)
     }
 
-    #[test]
-    fn axes_end_where_the_run_ends_and_names_stand_beside_them() {
+    pub fn axes_end_where_the_run_ends_and_names_stand_beside_them() {
         let points = |slope: f64| (0..=100).map(|k| (f64::from(k) * 0.0137, slope * f64::from(k))).collect();
         let lines = vec![Line { name: "elbow", points: points(1.0) }, Line { name: "wrist", points: points(-1.0) }];
         let plot = Plot { title: "run", axes: ("t [s]", "rad"), lines, levels: Vec::new() };

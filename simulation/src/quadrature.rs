@@ -33,12 +33,12 @@ pub(crate) fn integral(times: &[f64], y: impl Fn(usize) -> f64) -> f64 {
     weights(times).iter().enumerate().map(|(k, w)| w * y(k)).sum()
 }
 
-#[cfg(test)]
-mod tests {
+#[cfg(feature = "internals")]
+#[doc(hidden)]
+pub mod tests {
     use super::*;
 
-    #[test]
-    fn cubics_on_even_pieces_and_lines_on_all_others_are_exact() {
+    pub fn cubics_on_even_pieces_and_lines_on_all_others_are_exact() {
         // a jump at 1, then a piece that is not equally spaced
         let times = [0.0f64, 0.25, 0.5, 0.75, 1.0, 1.0, 1.1, 1.4, 2.0];
         let y = |k: usize| if k < 5 { times[k].powi(3) } else { 3.0 - times[k] };

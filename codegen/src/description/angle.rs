@@ -199,8 +199,9 @@ fn roll_pitch_yaw(rpy: &[Angle; 3], tolerance: f64) -> Mat3<Dd> {
     })
 }
 
-#[cfg(test)]
-mod tests {
+#[cfg(feature = "internals")]
+#[doc(hidden)]
+pub mod tests {
     use super::*;
     use crate::diagnostic::Place;
 
@@ -208,15 +209,13 @@ mod tests {
         Angle { value, unit, text: String::new(), place: Place::none() }
     }
 
-    #[test]
-    fn special_angles_have_names() {
+    pub fn special_angles_have_names() {
         let names: Vec<String> = [0, 6, -6, 12, 24, 3, -9, 2, 4, 8, 10, 18, 36].map(name_of_twelfths).into();
         let expected = ["0", "π/2", "-π/2", "π", "2π", "π/4", "-3π/4", "π/6", "π/3", "2π/3", "5π/6", "3π/2", "3π"];
         assert_eq!(names, expected);
     }
 
-    #[test]
-    fn table_of_special_angles_agrees_with_the_series() {
+    pub fn table_of_special_angles_agrees_with_the_series() {
         for m in (-48..=48).filter(|m| m % 2 == 0 || m % 3 == 0) {
             let (s, c) = sin_cos_of_twelfths(m);
             let (s2, c2) = (Dd::PI / Dd::from(12.0) * Dd::from(m as f64)).sin_cos();
@@ -224,8 +223,7 @@ mod tests {
         }
     }
 
-    #[test]
-    fn right_angles_are_exact_in_every_unit() {
+    pub fn right_angles_are_exact_in_every_unit() {
         for (value, unit) in [
             (90.0, AngleUnit::Degree),
             (-270.0, AngleUnit::Degree),
@@ -237,16 +235,14 @@ mod tests {
         }
     }
 
-    #[test]
-    fn tolerance_zero_takes_radians_literally() {
+    pub fn tolerance_zero_takes_radians_literally() {
         let reading = read(&angle(std::f64::consts::FRAC_PI_2, AngleUnit::Radian), 0.0);
         assert_eq!(reading.special, None);
         assert_eq!(reading.sin_cos.1.to_f64(), 6.123233995736766e-17);
         assert_eq!(reading.sin_cos.0.to_f64(), 1.0);
     }
 
-    #[test]
-    fn an_angle_beyond_the_tolerance_is_literal_and_within_it_exact() {
+    pub fn an_angle_beyond_the_tolerance_is_literal_and_within_it_exact() {
         let x = angle("1.57079632679".parse().expect("a number"), AngleUnit::Radian);
         assert_eq!(read(&x, ROUNDING).special, None);
         assert!((read(&x, ROUNDING).deviation + 4.9e-12).abs() < 1e-13);

@@ -156,16 +156,16 @@ pub(crate) fn principal_moments(j: Sym3<f64>) -> [f64; 3] {
     moments
 }
 
-#[cfg(test)]
-mod tests {
+#[cfg(feature = "internals")]
+#[doc(hidden)]
+pub mod tests {
     use super::*;
 
     fn determinant(r: &Mat3<Dd>) -> f64 {
         r.column(0).cross(r.column(1)).dot(r.column(2)).to_f64()
     }
 
-    #[test]
-    fn canonical_frames_are_rotations_with_z_along_the_axis() {
+    pub fn canonical_frames_are_rotations_with_z_along_the_axis() {
         let mut axes: Vec<[f64; 3]> = Vec::new();
         for x in [-1.0, -0.3, 0.0, 0.2, 1.0] {
             for y in [-2.0, 0.0, 0.5] {
@@ -187,8 +187,7 @@ mod tests {
         }
     }
 
-    #[test]
-    fn principal_moments_of_a_turned_tensor() {
+    pub fn principal_moments_of_a_turned_tensor() {
         let e = unit(vector([0.3, -0.5, 0.8])).expect("not zero");
         let turn = about(e, Dd::from(0.7).sin_cos());
         let j = Sym3 { xx: 0.1, yy: 0.5, zz: 0.55, xy: 0.0, xz: 0.0, yz: 0.0 }.map(Dd::from).rotated(&turn);

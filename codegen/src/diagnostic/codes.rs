@@ -249,8 +249,9 @@ const fn firm(code: &'static str, severity: Severity, sentence: &'static str) ->
     Code { code, severity, sentence, is_firm: true }
 }
 
-#[cfg(test)]
-mod tests {
+#[cfg(feature = "internals")]
+#[doc(hidden)]
+pub mod tests {
     use super::*;
     use std::path::Path;
 
@@ -270,15 +271,13 @@ mod tests {
         found
     }
 
-    #[test]
-    fn every_code_that_is_said_is_listed_with_its_severity() {
+    pub fn every_code_that_is_said_is_listed_with_its_severity() {
         let unlisted: Vec<_> =
             said().into_iter().filter(|(code, s)| find(code).is_none_or(|c| c.severity != *s)).collect();
         assert!(unlisted.is_empty(), "add to ALL: {unlisted:?}");
     }
 
-    #[test]
-    fn every_code_has_a_sentence() {
+    pub fn every_code_has_a_sentence() {
         for Code { code, sentence, .. } in ALL {
             assert!(sentence.ends_with('.') && sentence.starts_with(char::is_uppercase), "{code}: {sentence}");
         }

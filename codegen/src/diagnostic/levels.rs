@@ -144,12 +144,12 @@ impl fmt::Display for Level {
     }
 }
 
-#[cfg(test)]
-mod tests {
+#[cfg(feature = "internals")]
+#[doc(hidden)]
+pub mod tests {
     use super::*;
 
-    #[test]
-    fn the_last_level_counts_and_a_code_before_all_warnings() {
+    pub fn the_last_level_counts_and_a_code_before_all_warnings() {
         let mut levels = Levels::default();
         levels.set("axis-length", Level::Deny);
         levels.set("axis-length", Level::Warn);
@@ -161,8 +161,7 @@ mod tests {
         assert!(levels.applied(Diagnostic::note("more-complaints", "")).is_some());
     }
 
-    #[test]
-    fn levels_of_nothing_and_of_errors_are_refused() {
+    pub fn levels_of_nothing_and_of_errors_are_refused() {
         let said = |code, level| Levels::complaint(code, level).map(|d| d.line());
         assert_eq!(said("axis-length", Level::Allow), None);
         assert_eq!(said(ALL_WARNINGS, Level::Deny), None);
@@ -172,8 +171,7 @@ mod tests {
         assert_eq!(said("negative-mass", Level::Deny), None);
     }
 
-    #[test]
-    fn every_front_writes_options_its_own_way() {
+    pub fn every_front_writes_options_its_own_way() {
         let all = [Front::CommandLine, Front::Derive, Front::Builder];
         let tolerance = all.map(|front| front.option("angle_tolerance", Some("1e-6")));
         assert_eq!(tolerance, ["--angle-tolerance 1e-6", "angle_tolerance = 1e-6", ".angle_tolerance(1e-6)"]);

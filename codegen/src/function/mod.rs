@@ -1,7 +1,7 @@
 //! The functions that can be generated. Each stands in one file of this room, with its row ([`Spec`]) and its equations over any scalar
 //! ([`RobotFunction`]); here is the list, in the order in which functions stand in generated files.
 
-mod aliases;
+pub(crate) mod aliases;
 mod base_parameters;
 mod bias_derivatives;
 mod closed_derivatives;
@@ -16,7 +16,7 @@ mod frame_forces;
 mod kinematics;
 mod loops;
 mod motion_derivatives;
-mod quantity;
+pub(crate) mod quantity;
 mod regressors;
 mod rows;
 mod solution;

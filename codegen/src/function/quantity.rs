@@ -289,12 +289,12 @@ impl Quantity {
     }
 }
 
-#[cfg(test)]
-mod tests {
+#[cfg(feature = "internals")]
+#[doc(hidden)]
+pub mod tests {
     use super::*;
 
-    #[test]
-    fn every_quantity_is_found_by_its_name() {
+    pub fn every_quantity_is_found_by_its_name() {
         for quantity in TABLE.iter().map(|row| row.of).chain([HigherRate(3), HigherRate(MOST_DERIVATIVES + 2)]) {
             assert_eq!(Quantity::named(&quantity.name()), Some(quantity));
         }

@@ -325,8 +325,9 @@ macro_rules! tuple {
 tuple!(A B; 0 1);
 tuple!(A B C; 0 1 2);
 
-#[cfg(test)]
-mod tests {
+#[cfg(feature = "internals")]
+#[doc(hidden)]
+pub mod tests {
     use super::*;
     use crate::diagnostic::{Diagnostics, Source};
     use crate::options::{scene_file, Options};
@@ -376,8 +377,7 @@ environment = { kind = "elastic", stiffness = 2e4, damping = 60.0 }
     }
 
     /// As generated files hash it: who changes this text changes the hash of every file that says any of it.
-    #[test]
-    fn the_text_is_as_it_was() {
+    pub fn the_text_is_as_it_was() {
         assert_eq!(Options::default().stable_text(), "{}");
         let text = [
             r#"{functions=[jacobian,inverse_dynamics,];"#,
@@ -398,8 +398,7 @@ environment = { kind = "elastic", stiffness = 2e4, damping = 60.0 }
         assert_eq!(text_of(SCENE), text.concat());
     }
 
-    #[test]
-    fn every_number_and_word_of_a_scene_counts() {
+    pub fn every_number_and_word_of_a_scene_counts() {
         let whole = text_of(SCENE);
         let mut changed = 0;
         for (old, new) in [("0.25", "0.26"), ("tool\"]", "hand\"]"), ("linear", "angular"), ("impact", "projection")] {

@@ -16,7 +16,7 @@ mod items;
 pub mod packages;
 mod ptx;
 mod run;
-mod tokens;
+pub(crate) mod tokens;
 mod values;
 mod wanted;
 

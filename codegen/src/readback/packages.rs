@@ -64,13 +64,13 @@ pub(super) fn mismatch(text: &str, at: usize, what: String, function: String) ->
     Mismatch { function, line: before.matches('\n').count() + 1, text: shown, what }
 }
 
-#[cfg(test)]
-mod tests {
+#[cfg(feature = "internals")]
+#[doc(hidden)]
+pub mod tests {
     use super::READERS;
     use crate::emit::package::PACKAGES;
 
-    #[test]
-    fn every_kind_of_package_has_one_reader() {
+    pub fn every_kind_of_package_has_one_reader() {
         let of = |name: &str| READERS.iter().filter(|(of, _)| *of == name).count();
         let without: Vec<&str> = PACKAGES.iter().map(|kind| kind.name).filter(|name| of(name) != 1).collect();
         assert!(without.is_empty() && READERS.len() == PACKAGES.len(), "{without:?}");

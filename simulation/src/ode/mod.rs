@@ -202,8 +202,9 @@ fn root_mean_square(x: impl ExactSizeIterator<Item = f64>) -> f64 {
     (x.map(|x| x * x).sum::<f64>() / n).sqrt()
 }
 
-#[cfg(test)]
-mod tests {
+#[cfg(feature = "internals")]
+#[doc(hidden)]
+pub mod tests {
     use super::*;
 
     /// A system from a closure.
@@ -260,8 +261,7 @@ mod tests {
         rate.copy_from_slice(&[y[2], y[3], -y[0] / r3, -y[1] / r3, y[2] * y[2]]);
     }
 
-    #[test]
-    fn steps_grow_with_the_tolerance_as_the_order_says() {
+    pub fn steps_grow_with_the_tolerance_as_the_order_says() {
         let start = [0.7, 0.0, 0.0, (1.3f64 / 0.7).sqrt(), 0.0];
         for (method, tolerances, order) in [(Method::Adaptive, [1e-9, 1e-12], 8.0), (Method::Stiff, [1e-6, 1e-9], 5.0)]
         {
@@ -282,8 +282,7 @@ mod tests {
         }
     }
 
-    #[test]
-    fn the_implicit_method_takes_stiff_systems_of_any_size_in_few_steps() {
+    pub fn the_implicit_method_takes_stiff_systems_of_any_size_in_few_steps() {
         // van der Pol with μ = 1e6 in the time μ t (Hairer and Wanner 1996, IV.10): y(2) = 1.706167732170483
         let van_der_pol = |_: f64, y: &[f64], rate: &mut [f64]| {
             (rate[0], rate[1]) = (y[1], ((1.0 - y[0] * y[0]) * y[1] - y[0]) * 1e6);
@@ -305,8 +304,7 @@ mod tests {
         assert!((solved.y[80] - rod[80] * (0.1 * eigenvalue).exp()).abs() < 1e-6 && solved.accepted < 100);
     }
 
-    #[test]
-    fn what_leaves_the_finite_numbers_is_named() {
+    pub fn what_leaves_the_finite_numbers_is_named() {
         // 1/(1 − t) has no value at t = 1
         let pole = |_: f64, y: &[f64], rate: &mut [f64]| (rate[0], rate[1]) = (1.0, y[1] * y[1]);
         let hole = |_: f64, y: &[f64], rate: &mut [f64]| (rate[0], rate[1]) = (1.0, (0.5 - y[0]).sqrt());

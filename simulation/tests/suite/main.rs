@@ -7,4 +7,5 @@ mod contact_drives;
 mod drives;
 mod endurance;
 mod gains;
+mod inside;
 mod simulation;

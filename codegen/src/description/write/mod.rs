@@ -7,7 +7,7 @@ mod drives;
 pub mod edits;
 pub mod losses;
 pub(super) mod mjcf;
-mod rotations;
+pub(crate) mod rotations;
 pub(super) mod sdf;
 pub(super) mod toml;
 pub(super) mod urdf;

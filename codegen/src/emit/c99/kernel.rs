@@ -38,12 +38,12 @@ fn defined(section: &str) -> impl Iterator<Item = &str> {
     })
 }
 
-#[cfg(test)]
-mod tests {
+#[cfg(feature = "internals")]
+#[doc(hidden)]
+pub mod tests {
     use super::*;
 
-    #[test]
-    fn a_text_gets_the_sections_that_it_uses_and_no_others() {
+    pub fn a_text_gets_the_sections_that_it_uses_and_no_others() {
         let text = used_by("x = arm_sqrt_f64(y);", "arm");
         assert!(text.contains("arm_to_bits_f64(double x)\n{") && text.contains("arm_sqrt_f64(double x)\n{"), "{text}");
         assert!(!text.contains("sin") && !text.contains("float"), "{text}");

@@ -3,7 +3,7 @@
 mod cpp;
 mod header;
 pub mod interface;
-mod kernel;
+pub(crate) mod kernel;
 pub mod opencl;
 mod parameter;
 mod readme;
@@ -84,12 +84,12 @@ fn c_string(text: &str) -> String {
     out
 }
 
-#[cfg(test)]
-mod tests {
+#[cfg(feature = "internals")]
+#[doc(hidden)]
+pub mod tests {
     use super::*;
 
-    #[test]
-    fn what_people_call_things_stays_in_its_comment_and_its_literal() {
+    pub fn what_people_call_things_stays_in_its_comment_and_its_literal() {
         assert_eq!(c_comment("a*/ http://x ???/"), "a* / http:/ /x ? ? ?/");
         for (text, literal) in [
             ("arm", "\"arm\""),

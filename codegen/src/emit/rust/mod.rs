@@ -164,12 +164,12 @@ fn pasted(source: &str) -> String {
     indented(&source.lines().map(line).collect::<Vec<_>>().join("\n"))
 }
 
-#[cfg(test)]
-mod tests {
+#[cfg(feature = "internals")]
+#[doc(hidden)]
+pub mod tests {
     use super::*;
 
-    #[test]
-    fn a_number_is_a_literal_or_a_constant_of_its_type() {
+    pub fn a_number_is_a_literal_or_a_constant_of_its_type() {
         for (x, scalar, text) in [
             (0.1, Scalar::F32, "0.1"),
             (1e40, Scalar::F32, "f32::INFINITY"),

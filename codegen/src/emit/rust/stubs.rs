@@ -239,19 +239,18 @@ fn names_in(text: &str) -> impl Iterator<Item = &str> {
     })
 }
 
-#[cfg(test)]
-mod tests {
+#[cfg(feature = "internals")]
+#[doc(hidden)]
+pub mod tests {
     use super::*;
 
-    #[test]
-    fn names_are_found_in_text_that_no_reader_takes() {
+    pub fn names_are_found_in_text_that_no_reader_takes() {
         let text =
             "[[parameter]\nname = \"tool 2\"\n[[mode]]\nname='left'\ncontacts = [\nparameter = { name = \"Grip\" }";
         assert_eq!(names(text).into_iter().collect::<Vec<_>>(), ["grip", "left", "tool_2"]);
     }
 
-    #[test]
-    fn without_a_scene_the_functions_are_those_that_are_asked_for() {
+    pub fn without_a_scene_the_functions_are_those_that_are_asked_for() {
         let options =
             Options { functions: vec![Function::GravityForce], lanes: Some(Lanes::Runtime), ..Options::default() };
         let items = associated_items(&options, None, "<link name='panda hand'/>");

@@ -441,20 +441,19 @@ fn string(literal: &str) -> Option<Vec<u8>> {
     Some(out)
 }
 
-#[cfg(test)]
-mod tests {
+#[cfg(feature = "internals")]
+#[doc(hidden)]
+pub mod tests {
     use super::*;
 
-    #[test]
-    fn literals_are_read_as_c_reads_them() {
+    pub fn literals_are_read_as_c_reads_them() {
         assert_eq!(string(r#""a\"\\\?\303\237""#).as_deref(), Some(&b"a\"\\?\xc3\x9f"[..]));
         for literal in [r#""\x41""#, r#""??/""#, r#""\9""#, "a"] {
             assert_eq!(string(literal), None, "{literal}");
         }
     }
 
-    #[test]
-    fn lines_are_those_with_code() {
+    pub fn lines_are_those_with_code() {
         let text = "/* a\n * b */\nx = 1; /* c */\n\n/* d */\n  y\n/* e */ f(); /* g */\n/*\n*/ h\n";
         let lines: Vec<&str> = code_lines(text).into_iter().map(|(_, line)| line).collect();
         assert_eq!(lines, ["x = 1;", "y", "/* e */ f(); /* g */", " h"]);

@@ -2,10 +2,10 @@
 //! second time and compared word by word, the kernel with its source. The headers declare what the source defines, and the one for C++
 //! hands every argument on in its place.
 
-mod around;
+pub(crate) mod around;
 pub mod opencl;
 mod run;
-mod tokens;
+pub(crate) mod tokens;
 
 use super::values::{TextFormat, TextValue, Values};
 use super::wanted::{of_package, PackageFunction};

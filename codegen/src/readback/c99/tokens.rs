@@ -174,12 +174,12 @@ fn is_exponent(bytes: &[u8], at: usize) -> bool {
     matches!(bytes.get(at), Some(b'+' | b'-')) && matches!(bytes[at - 1], b'e' | b'E' | b'p' | b'P')
 }
 
-#[cfg(test)]
-mod tests {
+#[cfg(feature = "internals")]
+#[doc(hidden)]
+pub mod tests {
     use super::*;
 
-    #[test]
-    fn tokens_are_those_of_c() {
+    pub fn tokens_are_those_of_c() {
         let pieces = |text: &'static str| {
             let text = CText::read(text, 0, false).unwrap();
             (0..text.len()).map(|k| text.token(k).to_string()).collect::<Vec<_>>().join(" ")
