@@ -353,8 +353,10 @@ function begin() {
   const canvas = at("picture");
   canvas.setAttribute("aria-label", `${DATA.title} in three dimensions, with ${DATA.bodies.length} moving bodies`);
   at("scale").textContent = `grid ${written(SPACING, 2)} m`;
-  plots = DATA.charts.map((of) => chart(of, { times: TIMES, columns: COLUMNS, seek }));
-  at("plots").append(...plots.map((plot) => plot.box));
+  const span = timeSpan(TIMES, () => plots.forEach((plot) => plot.layOut()));
+  plots = DATA.charts.map((of) => chart(of, { times: TIMES, columns: COLUMNS, seek, span }));
+  at("plots").prepend(...plots.map((plot) => plot.box));
+  at("plot-keys").hidden = !plots.length;
   at("time").min = String(FIRST);
   at("time").max = String(LAST);
   at("time").addEventListener("input", () => seek(Number(at("time").value)));
@@ -388,6 +390,10 @@ function begin() {
     show();
   }).observe(canvas);
   listen(canvas);
+  if (asked.has("from") || asked.has("to")) {
+    const bound = (name, otherwise) => (asked.has(name) && isFinite(asked.get(name)) ? Number(asked.get(name)) : otherwise);
+    span.set(bound("from", FIRST), bound("to", LAST));
+  }
   if (asked.has("t")) seek(Number(asked.get("t")) || 0);
   else play(!calm);
   redraw();

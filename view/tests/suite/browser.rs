@@ -207,3 +207,86 @@ fn without_webgl_the_page_says_so_and_shows_its_plots() {
     assert_eq!(seen.document.matches("class=\"cursor\"").count(), 2);
     assert!(seen.document.contains("0.500 s</output>"));
 }
+
+/// What a script that is added to a page sees after its gestures: it writes into the page's title.
+fn told(name: &str, fragment: &str, script: &str) -> Option<String> {
+    let model = arm();
+    let page = written(&model, &ViewedRun::tour(&model));
+    // no script but its own would run
+    let page = page.replace("http-equiv=\"Content-Security-Policy\"", "name=\"policy\"");
+    let page = format!("{page}<script>setTimeout(() => {{ {script} }}, 200)</script>");
+    let seen = seen(name, &page, fragment, false, &["--disable-3d-apis"])?;
+    let title = seen.document.split("<title>").nth(1).and_then(|rest| rest.split("</title>").next());
+    Some(title.expect("a page has a title").to_string())
+}
+
+/// The span that plots say they show, and the numbers at the first plot's time axis.
+const SPAN: &str = "const plot = document.querySelector('.chart > svg');
+    const box = plot.getBoundingClientRect();
+    const middle = { clientX: box.left + 52 + (box.width - 64) / 2, clientY: box.top + 60, bubbles: true, cancelable: true };
+    const said = () => document.title = [...document.querySelectorAll('.chart[open] > svg')].map((svg) => svg.getAttribute('aria-label')).join(';');";
+
+/// Seconds that every plot says it shows.
+fn spans(title: &str) -> Vec<[f64; 2]> {
+    let number = |text: &str| text.trim_end_matches(" s").replace('\u{2212}', "-").parse::<f64>().unwrap();
+    title
+        .split(';')
+        .map(|label| {
+            let (from, to) = label.split_once(", from ").expect(label).1.split_once(" to ").expect(label);
+            [number(from), number(to)]
+        })
+        .collect()
+}
+
+#[test]
+fn plots_are_zoomed_together_by_wheel_keys_and_the_pages_address() {
+    let model = arm();
+    let times = ViewedRun::tour(&model).times;
+    let (first, last) = (times[0], times[times.len() - 1]);
+    let close = |spans: Vec<[f64; 2]>, from: f64, to: f64| {
+        assert_eq!(spans.len(), 2, "two plots are open");
+        for [a, b] in spans {
+            assert!((a - from).abs() < 1e-4 * last && (b - to).abs() < 1e-4 * last, "{a} {b} instead of {from} {to}");
+        }
+    };
+    let address = format!("t=0.5&from={}&to={}", 0.25 * last, 0.75 * last);
+    let Some(title) = told("zoom_address", &address, &format!("{SPAN} said()")) else { return };
+    close(spans(&title), 0.25 * last, 0.75 * last);
+    // with Ctrl, about the time under the pointer; without it the page scrolls
+    let wheel = "plot.dispatchEvent(new WheelEvent('wheel', { ...middle, deltaY: -60 }));
+        plot.dispatchEvent(new WheelEvent('wheel', { ...middle, deltaY: -60, ctrlKey: true }));";
+    let half = 0.5 * (last - first) * (-0.3_f64).exp();
+    let title = told("zoom_wheel", "t=0.5", &format!("{SPAN} {wheel} said()")).unwrap();
+    close(spans(&title), 0.5 * (first + last) - half, 0.5 * (first + last) + half);
+    let key =
+        |name: &str| format!("plot.dispatchEvent(new KeyboardEvent('keydown', {{ key: '{name}', bubbles: true }}));");
+    let keys = format!("{SPAN} {} {} said()", key("+"), key("ArrowRight"));
+    let from = 0.5 - 0.8 * (0.5 - first);
+    let size = 0.8 * (last - first);
+    let title = told("zoom_keys", "t=0.5", &keys).unwrap();
+    close(spans(&title), from + 0.1 * size, from + 1.1 * size);
+    let all = format!("{SPAN} {} {} said()", key("+"), key("0"));
+    let title = told("zoom_reset", "t=0.5", &all).unwrap();
+    assert!(title.split(';').count() == 2 && !title.contains("from"), "{title}");
+}
+
+#[test]
+fn a_span_of_a_plot_is_chosen_with_shift_and_a_line_of_many_rows_keeps_its_peaks() {
+    let drag = "plot.setPointerCapture = () => {};
+        const inner = box.width - 64;
+        const event = (name, part, buttons) => plot.dispatchEvent(new PointerEvent(name, { pointerId: 1, buttons, shiftKey: true, ...middle, clientX: box.left + 52 + part * inner }));
+        event('pointerdown', 0.2, 1); event('pointermove', 0.4, 1); event('pointerup', 0.4, 0);";
+    let Some(title) = told("zoom_drag", "t=0.5", &format!("{SPAN} {drag} said()")) else { return };
+    let last = *ViewedRun::tour(&arm()).times.last().unwrap();
+    for [from, to] in spans(&title) {
+        assert!((from - 0.2 * last).abs() < 0.01 * last && (to - 0.4 * last).abs() < 0.01 * last, "{from} {to}");
+    }
+    // two thousand rows in a hundred pixels, one of them a peak of each sign
+    let peaks =
+        "const values = Float32Array.from({ length: 2000 }, (_, k) => (k === 777 ? 5 : k === 1234 ? -7 : Math.sin(k)));
+        const times = Float64Array.from(values, (_, k) => k);
+        const d = path(times, values, [0, 1999], (t) => t / 20, (v) => v);
+        const heights = d.slice(1).split('L').map((point) => Number(point.split(' ')[1]));
+        document.title = [Math.max(...heights), Math.min(...heights), heights.length <= 400].join(' ');";
+    assert_eq!(told("peaks", "t=0.5", peaks).unwrap(), "5 -7 true");
+}
