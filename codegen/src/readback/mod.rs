@@ -54,7 +54,7 @@ impl fmt::Display for Mismatch {
 
 /// Where reading ends, in bytes from the text's first, and why.
 #[derive(Clone, Debug)]
-struct ReadingStop(Box<(usize, String)>);
+pub(crate) struct ReadingStop(Box<(usize, String)>);
 
 impl ReadingStop {
     fn at(at: usize, what: impl Into<String>) -> ReadingStop {

@@ -1,7 +1,7 @@
 //! What belongs to one room is named in no other: kinds of joints in theirs, the text of a language in its own. No name is two types', and
 //! what is long says why.
 
-use super::layers::sources;
+use super::layers::{sources, without_tests};
 use std::collections::BTreeMap;
 use std::fs::read_to_string;
 use std::path::Path;
@@ -68,7 +68,7 @@ fn is_in_a_string(line: &str, word: &str) -> bool {
 
 /// Lines of product code that name something, each with its place.
 fn named(word: &Word, path: &str, text: &str) -> Vec<String> {
-    let product = text.split("#[cfg(test)]").next().unwrap_or("");
+    let product = without_tests(text);
     let code = |line: &str| line.split("//").next().unwrap_or("").to_string();
     let lines = product.lines().enumerate().filter(|(_, line)| (word.is_named)(&code(line)));
     lines.map(|(k, line)| format!("{path}:{}: {}", k + 1, line.trim())).collect()
@@ -97,8 +97,7 @@ fn what_is_named_elsewhere_is_told_with_its_line() {
 
 /// The types that lines of code declare.
 fn declared(text: &str) -> impl Iterator<Item = &str> {
-    let product = text.split("#[cfg(test)]\nmod ").next().unwrap_or("");
-    product.lines().filter_map(|line| {
+    without_tests(text).lines().filter_map(|line| {
         let line = line.trim_start();
         let line = line.strip_prefix("pub").map_or(line, |rest| rest.split_once(' ').map_or("", |(_, rest)| rest));
         let name = ["struct ", "enum ", "trait ", "union "].iter().find_map(|word| line.strip_prefix(word))?;
@@ -129,7 +128,7 @@ fn types_are_found_where_they_are_declared() {
 
 /// Functions of more than 80 lines that do not say why, each with its line and length.
 fn long_functions(text: &str) -> Vec<(usize, usize)> {
-    let lines: Vec<&str> = text.split("#[cfg(test)]\nmod ").next().unwrap_or("").lines().collect();
+    let lines: Vec<&str> = without_tests(text).lines().collect();
     let is_head = |line: &str| {
         let words = line.trim_start().split(' ').take(4).collect::<Vec<_>>();
         let at = words.iter().position(|word| *word == "fn");
