@@ -38,13 +38,10 @@ impl BaseParameter {
 impl Model<Dd> {
     /// What base parameters are made of: ten numbers of the link behind every joint, in the order of the joints, then what joints add.
     pub fn link_parameters(&self) -> Vec<Dd> {
-        let mut bodies: Vec<_> = self.bodies.iter().collect();
-        bodies.sort_by_key(|body| body.joint.iv);
-        let of_links = bodies.iter().flat_map(|body| {
-            let load = body.total_about_origin().seen_from(&body.link_frame.inverse());
-            let (c, i) = (load.first_moment, load.second_moment.second_moment_to_inertia());
-            [load.mass, c.x, c.y, c.z, i.xx, i.xy, i.xz, i.yy, i.yz, i.zz]
-        });
+        let bodies: Vec<_> = self.bodies_in_order().into_iter().map(|b| &self.bodies[b]).collect();
+        let of_links = bodies
+            .iter()
+            .flat_map(|body| body.total_about_origin().seen_from(&body.link_frame.inverse()).to_inertial_parameters());
         let single = || bodies.iter().filter(|body| body.joint.kind.is_single());
         let kinds = self.base_parameters.joint_parameters.iter();
         of_links.chain(kinds.flat_map(|kind| single().map(|body| kind.value(&body.effects)))).collect()
@@ -177,6 +174,17 @@ impl<T: Real> Load<T> {
             first_moment: Vec3::new(x[1], x[2], x[3]),
             second_moment: Sym3 { xx: x[4], xy: x[5], xz: x[6], yy: x[7], yz: x[8], zz: x[9] },
         }
+    }
+
+    /// m, m c, I about the origin (xx, xy, xz, yy, yz, zz).
+    pub fn to_inertial_parameters(self) -> [T; PER_BODY] {
+        Load { second_moment: self.second_moment.second_moment_to_inertia(), ..self }.to_array()
+    }
+
+    /// From these.
+    pub fn from_inertial_parameters(x: [T; PER_BODY]) -> Self {
+        let load = Load::from_array(x);
+        Load { second_moment: load.second_moment.inertia_to_second_moment(), ..load }
     }
 
     /// The same about another origin in other axes, of a frame in which this one's has the pose `pose`.

@@ -85,9 +85,14 @@ impl<T> Model<T> {
 
     /// All joints in the order of the coordinates of the tree: those that are left to choose, then those that follow.
     pub fn tree_joints(&self) -> Vec<&Joint> {
-        let mut joints: Vec<&Joint> = self.bodies.iter().map(|body| &body.joint).collect();
-        joints.sort_by_key(|joint| joint.iv);
-        joints
+        self.bodies_in_order().into_iter().map(|b| &self.bodies[b].joint).collect()
+    }
+
+    /// The bodies in the order of their joints' coordinates of the tree.
+    pub fn bodies_in_order(&self) -> Vec<BodyId> {
+        let mut order: Vec<BodyId> = (0..self.bodies.len()).collect();
+        order.sort_by_key(|b| self.bodies[*b].joint.iv);
+        order
     }
 
     /// The joints that follow others with their couplings, in the order of the coordinates of the tree.

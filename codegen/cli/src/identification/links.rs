@@ -5,7 +5,7 @@ use straightline_codegen::convert::renumber::NewInertial;
 use straightline_codegen::description::{Description, WrittenInertial};
 use straightline_core::base_parameters::{JointParameter, PER_BODY};
 use straightline_core::model::{Load, Model};
-use straightline_core::spatial::{Sym3, Vec3};
+use straightline_core::spatial::Sym3;
 use straightline_core::Dd;
 use straightline_logs::consistent::{is_body, thickened};
 
@@ -38,12 +38,6 @@ pub struct LinkMap {
     pub made_of: Vec<Vec<f64>>,
     /// What is added: of masses that are not looked for.
     pub rest: Vec<f64>,
-}
-
-/// m, m c, I about the origin of the frame, in its axes.
-fn parameters(load: &Load<Dd>) -> [Dd; PER_BODY] {
-    let (c, i) = (load.first_moment, load.second_moment.second_moment_to_inertia());
-    [load.mass, c.x, c.y, c.z, i.xx, i.xy, i.xz, i.yy, i.yz, i.zz]
 }
 
 fn written(inertial: &WrittenInertial) -> [f64; PER_BODY] {
@@ -104,8 +98,7 @@ impl LinkMap {
 
 /// The parameters of joints, kind by kind, as base parameters are made of them.
 fn joints(model: &Model<Dd>, kinds: &[JointParameter]) -> Vec<(usize, JointParameter, f64)> {
-    let mut bodies: Vec<_> = model.bodies.iter().collect();
-    bodies.sort_by_key(|body| body.joint.iv);
+    let bodies: Vec<_> = model.bodies_in_order().into_iter().map(|b| &model.bodies[b]).collect();
     let of_kind = |kind: &JointParameter| {
         let kind = *kind;
         bodies
@@ -119,8 +112,7 @@ fn joints(model: &Model<Dd>, kinds: &[JointParameter]) -> Vec<(usize, JointParam
 
 /// What base parameters are made of, for a unit of each parameter of the links in turn, then of each joint's.
 fn columns(model: &Model<Dd>, links: &[IdentifiedLink], joints: usize) -> Vec<Vec<Dd>> {
-    let mut order: Vec<usize> = (0..model.bodies.len()).collect();
-    order.sort_by_key(|body| model.bodies[*body].joint.iv);
+    let order = model.bodies_in_order();
     let length = PER_BODY * model.bodies.len();
     let nothing = vec![Dd::ZERO; length + joints];
     let mut columns = Vec::with_capacity(PER_BODY * links.len() + joints);
@@ -129,9 +121,10 @@ fn columns(model: &Model<Dd>, links: &[IdentifiedLink], joints: usize) -> Vec<Ve
         let body = frame.body.expect("it moves");
         let rank = order.iter().position(|own| *own == body).expect("all bodies are there");
         for k in 0..PER_BODY {
-            let unit = inertia_unit(k).seen_from(&frame.placement).seen_from(&model.bodies[body].link_frame.inverse());
+            let unit = Load::from_inertial_parameters(std::array::from_fn(|j| if j == k { Dd::ONE } else { Dd::ZERO }));
+            let unit = unit.seen_from(&frame.placement).seen_from(&model.bodies[body].link_frame.inverse());
             let mut column = nothing.clone();
-            column[PER_BODY * rank..][..PER_BODY].copy_from_slice(&parameters(&unit));
+            column[PER_BODY * rank..][..PER_BODY].copy_from_slice(&unit.to_inertial_parameters());
             columns.push(column);
         }
     }
@@ -141,22 +134,6 @@ fn columns(model: &Model<Dd>, links: &[IdentifiedLink], joints: usize) -> Vec<Ve
         column
     }));
     columns
-}
-
-/// A unit of m, of a first moment, or of an entry of the inertia.
-fn inertia_unit(k: usize) -> Load<Dd> {
-    let is = |j: usize| if j == k { Dd::ONE } else { Dd::ZERO };
-    let inertia = Sym3 { xx: is(4), xy: is(5), xz: is(6), yy: is(7), yz: is(8), zz: is(9) };
-    let half_trace = Dd::HALF * (inertia.xx + inertia.yy + inertia.zz);
-    let second_moment = Sym3 {
-        xx: half_trace - inertia.xx,
-        yy: half_trace - inertia.yy,
-        zz: half_trace - inertia.zz,
-        xy: -inertia.xy,
-        xz: -inertia.xz,
-        yz: -inertia.yz,
-    };
-    Load { mass: is(0), first_moment: Vec3::new(is(1), is(2), is(3)), second_moment }
 }
 
 /// Rounded to the digits that are written.

@@ -214,9 +214,8 @@ impl RegressorModel {
 
     /// What joints add without a column: springs.
     fn known_forces(&self, q: &StateColumns, qd: &StateColumns) -> StateColumns {
-        let mut bodies: Vec<_> = self.exact.bodies.iter().collect();
-        bodies.sort_by_key(|body| body.joint.iv);
-        let of_joint = |(j, body): (usize, &&straightline_core::model::Body<Dd>)| -> Vec<f64> {
+        let bodies = self.exact.bodies_in_order().into_iter().map(|b| &self.exact.bodies[b]);
+        let of_joint = |(j, body): (usize, &straightline_core::model::Body<Dd>)| -> Vec<f64> {
             let effects: JointEffects<f64> = body.effects.map(|x| x.to_f64());
             let others = JointParameter::EVERY.into_iter().filter(|kind| !self.kinds.contains(kind));
             let others: Vec<(JointParameter, f64)> =
@@ -225,7 +224,7 @@ impl RegressorModel {
                 |i: usize| others.iter().map(|(kind, x)| x * kind.force(&effects, [q[j][i], qd[j][i], 0.0])).sum();
             (0..q[j].len()).map(force).collect()
         };
-        bodies.iter().enumerate().map(of_joint).collect()
+        bodies.enumerate().map(of_joint).collect()
     }
 }
 

@@ -61,8 +61,6 @@ fn rigid_body_forces<T: Real>(model: &Model<T>, q: &[T], qd: &[T], qdd: &[T], gr
 pub fn joint_wrenches<T: Real>(model: &Model<T>, q: &[T], qd: &[T], qdd: &[T]) -> Vec<ForceVector<T>> {
     let [q, qd, qdd] = &model.tree_motion([q, qd, qdd]);
     let wrenches = transmitted_wrenches(model, q, qd, qdd, model.gravity);
-    let mut order: Vec<usize> = (0..model.bodies.len()).collect();
-    order.sort_by_key(|&i| model.bodies[i].joint.iv);
     let in_link_axes = |i: usize| {
         T::section("wrenches", Some(i));
         let r_body_link = &model.bodies[i].link_frame.rotation;
@@ -71,7 +69,7 @@ pub fn joint_wrenches<T: Real>(model: &Model<T>, q: &[T], qd: &[T], qdd: &[T]) -
             force: r_body_link.transpose_mul(wrenches[i].force),
         }
     };
-    order.into_iter().map(in_link_axes).collect()
+    model.bodies_in_order().into_iter().map(in_link_axes).collect()
 }
 
 /// The component of each joint's wrench along the joint: the generalized forces, by velocity coordinate   (20.50)

@@ -44,8 +44,6 @@ pub fn subtrees<T: Real>(model: &Model<T>, q: &[T]) -> Vec<CarriedMass<T>> {
             momenta[body.joint.iv + k] = world[b].rotation * composites[b].wrench_of(&twist).force;
         }
     }
-    let mut order: Vec<usize> = (0..model.bodies.len()).collect();
-    order.sort_by_key(|b| model.bodies[*b].joint.iv);
     let subtree = |b: usize| {
         T::section("subtree", Some(b));
         let mass = composites[b].mass;
@@ -74,5 +72,5 @@ pub fn subtrees<T: Real>(model: &Model<T>, q: &[T]) -> Vec<CarriedMass<T>> {
         }
         CarriedMass { mass, centre, jacobian: model.free_columns(q, jacobian) }
     };
-    order.into_iter().map(subtree).collect()
+    model.bodies_in_order().into_iter().map(subtree).collect()
 }
