@@ -3,6 +3,7 @@
 //! Both steps are exact over the reals and done in double-double, in closed form: a solution by least squares would let
 //! digits of heavy links leak into light ones.
 
+use crate::description::angle;
 use rustc_hash::FxHasher;
 use std::hash::{Hash, Hasher};
 use straightline_core::model::{Body, BodyId, Model};
@@ -279,8 +280,8 @@ fn apart((s, c): (Dd, Dd)) -> ((Dd, Dd), Option<Dd>) {
     if s * c == Dd::ZERO {
         return ((s, c), None);
     }
-    // one step of Newton's method on sin(φ − φ₀) = 0 from the angle in f64
-    let near = Dd::from(s.hi().atan2(c.hi()));
+    // one step of Newton's method on sin(φ − φ₀) = 0 from the angle in f64, which every machine has to have: the last digits are left of it
+    let near = Dd::from(angle::of_point(s.hi(), c.hi()));
     let (sin, cos) = near.sin_cos();
     ((Dd::ZERO, Dd::ONE), Some(near + (s * cos - c * sin)))
 }

@@ -27,7 +27,8 @@ inside! {
         table_of_special_angles_agrees_with_the_series,
         right_angles_are_exact_in_every_unit,
         tolerance_zero_takes_radians_literally,
-        an_angle_beyond_the_tolerance_is_literal_and_within_it_exact;
+        an_angle_beyond_the_tolerance_is_literal_and_within_it_exact,
+        the_angle_of_a_point_is_the_nearest_and_needs_no_library;
     description_geometry: canonical_frames_are_rotations_with_z_along_the_axis, principal_moments_of_a_turned_tensor;
     description_write_rotations: rotations_come_back, right_angles_stay_exact;
     diagnostic_codes: every_code_that_is_said_is_listed_with_its_severity, every_code_has_a_sentence;

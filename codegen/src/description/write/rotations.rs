@@ -73,9 +73,9 @@ pub fn in_radians(value: f64) -> Angle {
     Angle { value, ..Angle::zero(Place::none()) }
 }
 
-/// The angle whose sine and cosine are y and x but for a factor: of f64's arc tangent one step of Newton, tan(θ − θ₀) = (y c₀ − x s₀) / (x c₀ + y s₀).
+/// The angle whose sine and cosine are y and x but for a factor: of the angle in f64 one step of Newton, tan(θ − θ₀) = (y c₀ − x s₀) / (x c₀ + y s₀).
 fn angle_of(y: Dd, x: Dd) -> f64 {
-    let start = y.to_f64().atan2(x.to_f64());
+    let start = angle::of_point(y.to_f64(), x.to_f64());
     let (sin, cos) = Dd::from(start).sin_cos();
     let along = x * cos + y * sin;
     let exact = match along.to_f64() == 0.0 {
