@@ -226,6 +226,9 @@ pub struct ReportArguments {
     /// As a page for the browser, complete in one file
     #[arg(long, value_name = "FILE", conflicts_with = "json")]
     pub html: Option<PathBuf>,
+    /// Where to draw the robot, each joint moving through its range, as `straightline view` does
+    #[arg(long, value_name = "FILE")]
+    pub view: Option<PathBuf>,
     #[command(flatten)]
     pub program: ProgramArgs,
     #[command(flatten)]

@@ -3,7 +3,7 @@
 use crate::arguments::Simulate;
 use crate::files::{self, read as read_file};
 use crate::motion::{failed, lines, print_run, undrawn, write_run};
-use crate::{print, CommandFailure};
+use crate::{print, view, CommandFailure};
 use anstream::stdout;
 use std::io::Write;
 use std::path::Path;
@@ -40,6 +40,9 @@ pub fn finish(
     let ContactRun { run, events, drift } = run.map_err(|failure| failed(&failure))?;
     if let Some(path) = &a.output {
         write_run(path, &run.table, &plant.model)?;
+    }
+    if let Some(path) = &a.view {
+        view::draw(path, &a.robot, &plant.model, (&a.input, &run.table))?;
     }
     if let Some(path) = &a.svg {
         let plot = |title, unit, prefixes: &[&str]| Plot {

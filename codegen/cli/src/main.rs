@@ -176,6 +176,9 @@ fn generate(a: &Generate) -> Result<(), CommandFailure> {
 
 fn report(a: &ReportArguments) -> Result<(), CommandFailure> {
     let (generated, options) = compiled_by(explain, &a.robot, &a.program, &a.model)?;
+    if let Some(path) = &a.view {
+        motion::draw_range(path, &a.robot, &a.model)?;
+    }
     if let Some(path) = &a.html {
         files::write(path, &html::page(&read(&a.robot)?, &options, &generated))?;
         return Ok(());

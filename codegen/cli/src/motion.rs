@@ -5,8 +5,8 @@ use crate::figures::{print_analysis, print_sweep};
 use crate::files::{self, read};
 pub use crate::motion_arguments::{Analyze, Simulate};
 use crate::search::{optimized, swept};
-pub use crate::view::{view, ViewArguments};
-use crate::{contact, gains, logs, options, page, print, CommandFailure};
+pub use crate::view::{draw_range, view, ViewArguments};
+use crate::{contact, gains, logs, options, page, print, view, CommandFailure};
 use anstream::stdout;
 use std::io::Write;
 use std::path::Path;
@@ -207,6 +207,9 @@ pub fn simulate(a: &Simulate) -> Result<(), CommandFailure> {
     if let Some(path) = &a.output {
         write_run(path, &run.table, &plant.model)?;
     }
+    if let Some(path) = &a.view {
+        view::draw(path, &a.robot, &plant.model, (&a.input, &run.table))?;
+    }
     if let Some(path) = &a.svg {
         let is_controlled = matches!(experiment.command, Command::Controller(_));
         let (prefix, title) = if is_controlled { ("error.", "tracking errors") } else { ("q.", "coordinates") };
@@ -272,6 +275,9 @@ pub fn analyze(a: &Analyze) -> Result<(), CommandFailure> {
     let found = analysis::analyze(&model, &motion, a.interval).map_err(|failure| not_analysed(&failure))?;
     if let Some(path) = &a.output {
         write_run(path, &joined(&found), &model)?;
+    }
+    if let Some(path) = &a.view {
+        view::draw(path, &a.robot, &model, (&a.motion, &joined(&found)))?;
     }
     let swept = match &a.sweep {
         None => Vec::new(),

@@ -20,6 +20,9 @@ pub struct Simulate {
     /// Where to draw coordinates, torques and, of a controller, errors
     #[arg(long, value_name = "FILE")]
     pub svg: Option<PathBuf>,
+    /// Where to draw it in motion, as `straightline view` does
+    #[arg(long, value_name = "FILE")]
+    pub view: Option<PathBuf>,
     /// Steps that the integration may take [default: max_steps of the experiment, or 1000000]
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..).map(|n| n as usize))]
     pub max_steps: Option<usize>,
@@ -43,6 +46,9 @@ pub struct Analyze {
     /// Where to write a page with tables and plots
     #[arg(long, value_name = "FILE")]
     pub html: Option<PathBuf>,
+    /// Where to draw it in motion, as `straightline view` does
+    #[arg(long, value_name = "FILE")]
+    pub view: Option<PathBuf>,
     /// Propose feedback gains, as the table [gains] of the motion's file says or by default, and write those of LQR over time here: CSV,
     /// JSON or Parquet, as its name ends
     #[arg(long, value_name = "FILE")]

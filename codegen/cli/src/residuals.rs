@@ -3,7 +3,7 @@
 use crate::arguments::{robot_file, ModelArgs, EXIT_CODES};
 use crate::files::{self, read};
 use crate::log_files::{aligned_log, cutoff, not_loaded, print_table, report_lines};
-use crate::{motion, options, print, residuals_page as page, CommandFailure};
+use crate::{motion, options, print, residuals_page as page, view, CommandFailure};
 use anstream::stdout;
 use clap::Args;
 use std::io::Write;
@@ -41,6 +41,9 @@ pub struct Residuals {
     /// Where to write a page with tables and plots
     #[arg(long, value_name = "FILE")]
     pub html: Option<PathBuf>,
+    /// Where to draw the robot in motion with residual torques as arrows and plots that zoom, as `straightline view` does
+    #[arg(long, value_name = "FILE")]
+    pub view: Option<PathBuf>,
     #[command(flatten)]
     pub model: ModelArgs,
 }
@@ -56,6 +59,7 @@ odd are listed. Friction is what the model lacks; numbers have their standard er
 Examples:
   straightline residuals panda.urdf run.mcap
   straightline residuals panda.urdf run.mcap --topic /joint_states -o residuals.csv --html run.html
+  straightline residuals panda.urdf run.mcap --view moving.html
   straightline residuals panda.urdf run.csv --cutoff 5 --payload panda_hand
 
 {EXIT_CODES}"
@@ -97,6 +101,9 @@ pub fn residuals(a: &Residuals) -> Result<(), CommandFailure> {
     }
     if let Some(path) = &a.html {
         files::write(path, &page::page(a, &findings))?;
+    }
+    if let Some(path) = &a.view {
+        view::draw(path, &a.robot, &findings.model.model, (&a.log, &findings.table()))?;
     }
     findings.print(a)
 }

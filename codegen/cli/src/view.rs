@@ -10,6 +10,7 @@ use straightline_codegen::diagnostic::{Diagnostics, Severity};
 use straightline_core::model::Model;
 use straightline_simulation::analysis::analyze;
 use straightline_simulation::html::four_digits;
+use straightline_simulation::table::DataTable;
 use straightline_view::{page, urdf_look, ViewFailure, ViewedLook, ViewedRun};
 
 /// Time between instants of a motion that is analysed, at most \[s\].
@@ -49,22 +50,48 @@ impl ViewArguments {
 }
 
 pub fn view(a: &ViewArguments) -> Result<(), CommandFailure> {
+    let Some(path) = &a.run else { return draw_range(&a.output, &a.robot, &a.model) };
     let (_, _, model) = robot(&a.robot, &a.model, false)?;
-    let run = match &a.run {
-        None => ViewedRun::tour(&model),
-        Some(path) if path.extension().is_some_and(|e| e == "toml") => prescribed(path, &model)?,
-        Some(path) => of_file(path, &model)?,
+    let run = match path.extension().is_some_and(|e| e == "toml") {
+        true => prescribed(path, &model)?,
+        false => of_file(path, &model)?,
     };
+    written(&a.output, &a.robot, &model, &run, Some(path))
+}
+
+/// Draws a robot each of whose joints moves through its range.
+pub fn draw_range(output: &Path, file: &Path, args: &ModelArgs) -> Result<(), CommandFailure> {
+    let (_, _, model) = robot(file, args, false)?;
+    written(output, file, &model, &ViewedRun::tour(&model), None)
+}
+
+/// Draws what a table says of a robot's motion, which came of this file.
+pub fn draw(
+    output: &Path,
+    robot: &Path,
+    model: &Model<f64>,
+    (file, table): (&Path, &DataTable),
+) -> Result<(), CommandFailure> {
+    let run = ViewedRun::of_columns(model, &columns(table)).map_err(|failures| refused(Some(file), &failures))?;
+    written(output, robot, model, &run, Some(file))
+}
+
+fn written(
+    output: &Path,
+    robot: &Path,
+    model: &Model<f64>,
+    run: &ViewedRun,
+    of: Option<&Path>,
+) -> Result<(), CommandFailure> {
     let file = |path: &Path| path.file_name().map(|name| name.to_string_lossy().to_string()).unwrap_or_default();
-    let mut facts = vec![("Robot file", file(&a.robot))];
-    facts.extend(a.run.as_deref().map(|path| ("Run", file(path))));
+    let mut facts = vec![("Robot file", file(robot))];
+    facts.extend(of.map(|path| ("Run", file(path))));
     if let [first, .., last] = run.times[..] {
         facts.push(("Duration", format!("{} s", four_digits(last - first))));
     }
     facts.push(("Drawn by", format!("straightline {}", straightline_codegen::VERSION)));
-    let look = look(&a.robot, &model)?;
-    let page = page(&model, &look, &run, &facts).map_err(|failures| refused(a.run.as_deref(), &failures))?;
-    files::write(&a.output, &page)
+    let page = page(model, &look(robot, model)?, run, &facts).map_err(|failures| refused(of, &failures))?;
+    files::write(output, &page)
 }
 
 /// What a URDF says of the robot's looks. Meshes are looked for beside the robot file, and in the packages whose folders it lies in.

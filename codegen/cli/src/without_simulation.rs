@@ -4,6 +4,7 @@ use crate::arguments::ModelArgs;
 use crate::{print, CommandFailure};
 use clap::Args;
 use std::ffi::OsString;
+use std::path::Path;
 
 /// Whatever follows the command.
 #[derive(Debug, Args)]
@@ -23,15 +24,24 @@ impl Simulate {
     }
 }
 
-pub fn simulate(_: &Simulate) -> Result<(), CommandFailure> {
-    Err(print::failure_with(
+fn without() -> CommandFailure {
+    print::failure_with(
         "this `straightline` has no simulation: it was built without the feature `simulation`",
         &["cargo install --path codegen/cli --features simulation, or parquet, which reads and writes Parquet files, too"],
-    ))
+    )
+}
+
+pub fn simulate(_: &Simulate) -> Result<(), CommandFailure> {
+    Err(without())
 }
 
 pub fn analyze(a: &Analyze) -> Result<(), CommandFailure> {
     simulate(a)
+}
+
+/// Of a robot that moves through its range.
+pub fn draw_range(_: &Path, _: &Path, _: &ModelArgs) -> Result<(), CommandFailure> {
+    Err(without())
 }
 
 pub fn view(a: &ViewArguments) -> Result<(), CommandFailure> {

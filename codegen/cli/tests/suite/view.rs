@@ -90,6 +90,37 @@ fn a_prescribed_motion_is_analysed_and_its_figures_are_drawn_as_well() {
     }
 }
 
+/// `simulate`, `analyze`, `residuals` and `report` draw what `view` makes of the files that they write.
+#[test]
+fn other_commands_draw_what_view_draws_of_what_they_write() {
+    let here = scratch("others");
+    let panda = format!("{ROBOTS}/descriptions/panda.urdf");
+    let experiment = |name: &str| format!("{ROBOTS}/experiments/{name}.toml");
+    let file = |name: &str| here.join(name).display().to_string();
+    let (track, reach) = (experiment("panda_track"), experiment("panda_reach"));
+    let run = file("simulate.csv");
+    let commands: [&[&str]; 3] = [
+        &["simulate", &panda, "--input", &track],
+        &["analyze", &panda, "--motion", &reach, "--interval", "0.01"],
+        &["residuals", &panda, &run],
+    ];
+    for arguments in commands {
+        let name = arguments[0];
+        let [table, drawn, viewed] = ["csv", "html", "view.html"].map(|end| file(&format!("{name}.{end}")));
+        succeeds(&[arguments, &["--output", &table, "--view", &drawn]].concat());
+        succeeds(&["view", &panda, &table, "-o", &viewed]);
+        let [drawn, viewed] = [drawn, viewed].map(|path| page(&path).1);
+        for key in ["poses", "times", "columns", "charts", "arrows", "notes"] {
+            assert_eq!(drawn[key], viewed[key], "{name}: {key}");
+        }
+        assert!(drawn["rows"].as_u64() > Some(100), "{name}");
+    }
+    let [drawn, viewed] = [file("report.html"), file("tour.html")];
+    succeeds(&["report", &panda, "--function", "gravity_force", "--view", &drawn]);
+    succeeds(&["view", &panda, "-o", &viewed]);
+    assert_eq!(fs::read_to_string(drawn).unwrap(), fs::read_to_string(viewed).unwrap());
+}
+
 #[test]
 fn without_a_run_joints_move_in_turn_and_a_base_may_float() {
     let here = scratch("tour");
