@@ -48,8 +48,7 @@ inside! {
         a_name_becomes_an_identifier_whatever_it_is_made_of,
         every_name_is_a_prefix_and_every_prefix_makes_a_package,
         no_reserved_word_is_left_as_an_identifier,
-        a_name_cannot_leave_the_comment_it_stands_in,
-        a_literal_reads_back_to_the_text;
+        a_name_cannot_leave_the_comment_it_stands_in;
     options_stable: the_text_is_as_it_was, every_number_and_word_of_a_scene_counts;
     output:
         a_file_is_replaced_whole_and_left_alone_when_it_is_the_same,
@@ -64,6 +63,13 @@ inside! {
     readback_packages: every_kind_of_package_has_one_reader;
     readback_tokens: numbers_fields_and_ranges_are_told_apart, what_is_no_text_of_ours_is_refused;
     report_errors: bounds_are_rounded_up;
+}
+
+/// The compiler itself does without a reader of Rust.
+#[test]
+fn a_literal_reads_back_to_the_text() {
+    let read = |literal: &str| syn::parse_str::<syn::LitStr>(literal).expect("a literal").value();
+    internals::identifier::a_literal_reads_back_to_the_text(read);
 }
 
 /// The names of functions of `mod tests` in a folder's files.
