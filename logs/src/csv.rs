@@ -2,46 +2,49 @@
 
 use crate::failure::LogError;
 use crate::log::{from_columns, JointLog};
+use crate::threads::{in_threads, processors};
 
 /// So many complaints are told one by one.
 const MOST_COMPLAINTS: usize = 10;
+
+/// Bytes that are worth a thread.
+const WORTH: usize = 1 << 20;
 
 /// The log of a file. Lines that begin with `#` are remarks; an empty field, `nan` and the like are missing numbers.
 ///
 /// # Errors
 /// Fields that are no numbers, rows of another length, columns that make no log.
 pub fn read(bytes: &[u8]) -> Result<JointLog, LogError> {
-    let mut reader = ::csv::ReaderBuilder::new().trim(::csv::Trim::All).comment(Some(b'#')).from_reader(bytes);
+    let mut reader = reader(bytes, true);
     let headers = reader.headers().map_err(|error| unreadable(&error))?.clone();
-    let mut columns: Vec<(String, Vec<f64>)> = headers.iter().map(|name| (name.to_string(), Vec::new())).collect();
-    if let Some(twice) = (1..columns.len()).find(|k| columns[..*k].iter().any(|(name, _)| *name == columns[*k].0)) {
-        return Err(LogError::new("line 1", format!("two columns `{}`", columns[twice].0), "leave one out"));
+    let names: Vec<String> = headers.iter().map(ToString::to_string).collect();
+    if let Some(twice) = (1..names.len()).find(|k| names[..*k].contains(&names[*k])) {
+        return Err(LogError::new("line 1", format!("two columns `{}`", names[twice]), "leave one out"));
     }
-    let clock = columns.iter().position(|(name, _)| name == "t");
-    let (mut record, mut complaints, mut start) = (::csv::ByteRecord::new(), Vec::new(), None);
-    while reader.read_byte_record(&mut record).map_err(|error| unreadable(&error))? {
-        for (k, ((name, column), field)) in columns.iter_mut().zip(&record).enumerate() {
-            let number = match Some(k) == clock {
-                true => seconds(field, &mut start),
-                false => number(field),
-            };
-            if number.is_none() {
-                let line = record.position().map_or(0, ::csv::Position::line);
-                complaints
-                    .push(format!("line {line}: `{}` in column `{name}` is no number", String::from_utf8_lossy(field)));
-            }
-            column.push(number.unwrap_or(f64::NAN));
-        }
-        if complaints.len() > MOST_COMPLAINTS {
-            complaints.truncate(MOST_COMPLAINTS);
-            complaints.push("and so on".to_string());
-            break;
-        }
+    let clock = names.iter().position(|name| name == "t");
+    let body = (reader.position().byte() as usize).min(bytes.len());
+    let mut first = ::csv::ByteRecord::new();
+    let has_rows = reader.read_byte_record(&mut first).map_err(|error| unreadable(&error))?;
+    let field = clock.filter(|_| has_rows).and_then(|k| first.get(k));
+    let table = CsvTable { names: &names, clock, start: field.map_or(0, whole_seconds) };
+    let parts = parts(&bytes[body..], 1 + line_ends(&bytes[..body]));
+    let read = in_threads(parts.len(), |k| table.rows(parts[k].0, parts[k].1));
+    let mut columns = vec![Vec::new(); names.len()];
+    let mut complaints = Vec::new();
+    for rows in read {
+        let (more, wrong) = rows?;
+        columns.iter_mut().zip(more).for_each(|(column, more): (&mut Vec<f64>, _)| column.extend(more));
+        complaints.extend(wrong);
+    }
+    if complaints.len() > MOST_COMPLAINTS {
+        complaints.truncate(MOST_COMPLAINTS);
+        complaints.push("and so on".to_string());
     }
     match complaints.is_empty() {
         true => {
-            let log = from_columns(columns)?;
-            Ok(JointLog { start: start.unwrap_or(0).saturating_mul(1_000_000_000), ..log })
+            let start = table.start.saturating_mul(1_000_000_000);
+            let log = from_columns(names.into_iter().zip(columns).collect())?;
+            Ok(JointLog { start, ..log })
         }
         false => Err(LogError::new(
             "",
@@ -51,9 +54,84 @@ pub fn read(bytes: &[u8]) -> Result<JointLog, LogError> {
     }
 }
 
+fn reader(bytes: &[u8], has_headers: bool) -> ::csv::Reader<&[u8]> {
+    let mut builder = ::csv::ReaderBuilder::new();
+    builder.trim(::csv::Trim::All).comment(Some(b'#')).flexible(true).has_headers(has_headers);
+    builder.from_reader(bytes)
+}
+
+/// Rows in parts for threads, each with the number of its first line. A line that may go on behind its end, by a quotation mark, is not taken apart.
+fn parts(body: &[u8], first: u64) -> Vec<(&[u8], u64)> {
+    let count = (body.len() / WORTH).clamp(1, processors());
+    if body.contains(&b'"') {
+        return vec![(body, first)];
+    }
+    let (mut left, mut line, mut parts) = (body, first, Vec::new());
+    for k in 0..count {
+        let about = left.len() / (count - k);
+        let end = left[about..].iter().position(|byte| *byte == b'\n').map_or(left.len(), |at| about + at + 1);
+        let (part, rest) = left.split_at(end);
+        parts.push((part, line));
+        line += line_ends(part);
+        left = rest;
+    }
+    parts
+}
+
+fn line_ends(bytes: &[u8]) -> u64 {
+    bytes.iter().filter(|byte| **byte == b'\n').count() as u64
+}
+
+/// How many lines stand before the record that begins there, with remarks and empty lines in front of it.
+fn lines_before(bytes: &[u8], mut at: usize) -> u64 {
+    while let Some(b'#' | b'\r' | b'\n') = bytes.get(at) {
+        at += bytes[at..].iter().position(|byte| *byte == b'\n').map_or(bytes.len() - at, |end| end + 1);
+    }
+    line_ends(&bytes[..at])
+}
+
+/// What rows of a table are read by.
+struct CsvTable<'a> {
+    names: &'a [String],
+    /// The column of time stamps.
+    clock: Option<usize>,
+    /// Whole seconds that time stamps are counted from.
+    start: i64,
+}
+
+impl CsvTable<'_> {
+    /// The columns of some rows, and what is wrong in them; the first of them stands in that line.
+    fn rows(&self, bytes: &[u8], first: u64) -> Result<(Vec<Vec<f64>>, Vec<String>), LogError> {
+        let mut reader = reader(bytes, false);
+        let (mut record, mut complaints) = (::csv::ByteRecord::new(), Vec::new());
+        let mut columns = vec![Vec::new(); self.names.len()];
+        while reader.read_byte_record(&mut record).map_err(|error| unreadable(&error))? {
+            let line = || first + lines_before(bytes, record.position().map_or(0, ::csv::Position::byte) as usize);
+            if record.len() != columns.len() {
+                let what = format!("{} fields, and the header has {}", record.len(), columns.len());
+                return Err(LogError::new(format!("line {}", line()), what, FORM));
+            }
+            for (k, (column, field)) in columns.iter_mut().zip(&record).enumerate() {
+                let number = if Some(k) == self.clock { seconds(field, self.start) } else { number(field) };
+                if number.is_none() {
+                    let (field, name) = (String::from_utf8_lossy(field), &self.names[k]);
+                    complaints.push(format!("line {}: `{field}` in column `{name}` is no number", line()));
+                }
+                column.push(number.unwrap_or(f64::NAN));
+            }
+            if complaints.len() > MOST_COMPLAINTS {
+                break;
+            }
+        }
+        Ok((columns, complaints))
+    }
+}
+
+const FORM: &str = "a log as CSV has a header, then as many fields in each row";
+
 fn unreadable(error: &::csv::Error) -> LogError {
     let line = error.position().map_or(String::new(), |p| format!("line {}", p.line()));
-    LogError::new(line, error.to_string(), "a log as CSV has a header, then as many fields in each row")
+    LogError::new(line, error.to_string(), FORM)
 }
 
 fn number(field: &[u8]) -> Option<f64> {
@@ -63,13 +141,17 @@ fn number(field: &[u8]) -> Option<f64> {
     }
 }
 
+/// The whole seconds of the first time stamp, where it counts from an epoch.
+fn whole_seconds(field: &[u8]) -> i64 {
+    let whole = std::str::from_utf8(field).ok().and_then(|text| text.split('.').next());
+    whole.and_then(|whole| whole.parse::<i64>().ok()).filter(|s| *s > 1_000_000).unwrap_or(0)
+}
+
 /// A time stamp, without the whole seconds of the first where that counts from an epoch: doubles have no digits left for nanoseconds there.
-fn seconds(field: &[u8], start: &mut Option<i64>) -> Option<f64> {
+fn seconds(field: &[u8], first: i64) -> Option<f64> {
     let text = std::str::from_utf8(field).ok()?;
     let whole = text.split('.').next().unwrap_or("");
-    let count = whole.parse::<i64>().ok();
-    let first = *start.get_or_insert_with(|| count.filter(|s| *s > 1_000_000).unwrap_or(0));
-    match (first, count) {
+    match (first, whole.parse::<i64>().ok()) {
         (0, _) | (_, None) => number(field).map(|t| t - first as f64),
         (_, Some(count)) => {
             let rest = &text[whole.len()..];

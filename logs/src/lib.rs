@@ -2,7 +2,7 @@
 //!
 //! A [`log::JointLog`] is joint names, time stamps and columns of numbers, read from MCAP ([`mcap`]) or CSV ([`csv`]), with nothing repaired.
 //! [`align`] puts the joints into an order, judges the clock, and says what it met. [`smooth`], [`observer`], [`fit`] and [`episodes`] are what
-//! residual torques take, [`weighted`] and [`consistent`] what identification does; they know no robot: model torques and regressors come from the caller.
+//! residual torques take, [`weighted`] and [`consistent`] what identification does; they know no robot, and [`threads`] spreads columns over processors: model torques and regressors come from the caller.
 #![forbid(unsafe_code)]
 
 pub mod align;
@@ -19,6 +19,7 @@ pub mod mcap;
 pub mod observer;
 mod records;
 pub mod smooth;
+pub mod threads;
 pub mod transforms;
 pub mod weighted;
 

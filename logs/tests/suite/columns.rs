@@ -3,6 +3,7 @@
 use straightline_logs::align::align;
 use straightline_logs::csv::read;
 use straightline_logs::log::LogQuantity;
+use straightline_logs::threads::in_threads;
 
 #[test]
 fn a_table_with_missing_numbers_is_a_log_that_says_so() {
@@ -46,4 +47,41 @@ fn all_fields_that_are_no_numbers_are_told_with_their_lines() {
         let error = read(text.as_bytes()).expect_err("it is no log");
         assert!(error.to_string().contains(words) && !error.help.is_empty(), "{error:?}");
     }
+}
+
+/// Of megabytes each processor reads a part: the numbers are those of the lines, and complaints have their lines.
+#[test]
+fn parts_of_a_long_file_are_read_as_its_lines() {
+    let row =
+        |i: u32| format!("{}.{:03},{:?}, {:?}\r\n", 1_700_000_000 + i / 1000, i % 1000, f64::from(i) / 7.0, -1e-3);
+    let rows: Vec<String> = (0..200_000).map(row).collect();
+    let text = |rows: &[String]| format!("# recorded in the lab\nt,q.a,tau.a\n{}", rows.concat());
+    assert!(text(&rows).len() > 6 << 20);
+    let log = read(text(&rows).as_bytes()).expect("a log");
+    assert_eq!((log.start, log.times.len()), (1_700_000_000_000_000_000, rows.len()));
+    for (i, (t, q)) in log.times.iter().zip(log.column(LogQuantity::Position, 0)).enumerate() {
+        assert!((t - i as f64 * 1e-3).abs() < 1e-9 && *q == i as f64 / 7.0, "{i}: {t} {q}");
+    }
+    let mut wrong = rows.clone();
+    wrong[150_000] = "1700000150.0,0.5,much\n# a remark\n".to_string();
+    wrong[199_999] = "1700000199.999,,0,\"1\"".to_string();
+    let said = |rows: &[String]| read(text(rows).as_bytes()).expect_err("it is wrong").to_string();
+    assert!(said(&wrong).contains("line 200003: 4 fields, and the header has 3"), "{}", said(&wrong));
+    wrong[199_999] = "1700000199.999,,\"0\"\n".to_string();
+    let quoted = said(&wrong);
+    wrong[199_999] = "1700000199.999,,0\n".to_string();
+    assert!(quoted.contains("line 150003: `much` in column `tau.a`"), "{quoted}");
+    assert_eq!(said(&wrong), quoted, "a quotation mark makes it one part");
+    wrong[3..].iter_mut().for_each(|row| *row = "1,x,y\n".to_string());
+    let said = said(&wrong);
+    assert!(said.matches("is no number").count() == 10 && said.contains("line 6: `x`"), "{said}");
+}
+
+#[test]
+fn what_threads_make_comes_in_order_and_their_panics_come_through() {
+    let squares = in_threads(1000, |k| k * k);
+    assert!(squares.len() == 1000 && squares.iter().enumerate().all(|(k, x)| *x == k * k));
+    assert!(in_threads(0, |k| k).is_empty());
+    let panics = std::panic::catch_unwind(|| in_threads(8, |k| assert!(k < 5, "part {k}")));
+    assert!(panics.is_err());
 }

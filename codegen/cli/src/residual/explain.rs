@@ -6,6 +6,7 @@ use straightline_logs::align::AlignedLog;
 use straightline_logs::episodes::{episodes, robust_spread, Episode, EpisodeDemand};
 use straightline_logs::fit::{Fitted, LeastSquares};
 use straightline_logs::smooth::LowPass;
+use straightline_logs::threads::in_threads;
 
 /// What is fitted of each joint: an offset \[N·m or N\], viscous friction \[N·m·s/rad or N·s/m\], Coulomb friction \[N·m or N\].
 pub const JOINT_PARAMETERS: [&str; 3] = ["offset", "viscous", "Coulomb"];
@@ -89,7 +90,8 @@ fn signs(log: &AlignedLog, residuals: &ResidualTorques) -> Vec<Vec<f64>> {
             |s: &std::ops::Range<usize>| LowPass { cutoff }.apply(&log.times[s.clone()], &signs[s.clone()]).values;
         log.segments.iter().flat_map(part).collect()
     };
-    residuals.motion[1].iter().map(one).collect()
+    let qd = &residuals.motion[1];
+    in_threads(qd.len(), |j| one(&qd[j]))
 }
 
 /// Torques of one unit of each parameter of the payload, per row and joint.
@@ -110,10 +112,10 @@ pub fn explain(log: &AlignedLog, residuals: &ResidualTorques, payload: Option<&U
     let signs = signs(log, residuals);
     let [q, qd, qdd] = &residuals.motion;
     let mut carried: Option<CarriedRows> =
-        payload.map(|units| rows.iter().map(|i| units.rows([q, qd, qdd], *i)).collect());
+        payload.map(|units| in_threads(rows.len(), |n| units.rows([q, qd, qdd], rows[n])));
     let mut solved = solve(log, residuals, &signs, &rows, carried.as_ref());
     // somebody's hand is neither friction nor payload: what is far from all else is left out, and all else fitted again
-    let met: Vec<Episode> = (0..qd.len()).flat_map(|j| episodes_of(log, residuals, j, &solved.left[j])).collect();
+    let met: Vec<Episode> = in_threads(qd.len(), |j| episodes_of(log, residuals, j, &solved.left[j])).concat();
     let around = residuals.cutoff.map_or(0.0, |cutoff| 1.0 / cutoff);
     let is_quiet = |t: f64| met.iter().all(|e| t < e.from - around || t > e.to + around);
     let quiet: Vec<bool> = rows.iter().map(|i| is_quiet(log.times[*i])).collect();
@@ -128,7 +130,7 @@ pub fn explain(log: &AlignedLog, residuals: &ResidualTorques, payload: Option<&U
         solved = solve(log, residuals, &signs, &rows, carried.as_ref());
     }
     let ExplainedFit { found, offset, payload, left } = solved;
-    let joints = (0..qd.len()).map(|j| joint_figure(log, residuals, j, (&found, offset), &left[j])).collect();
+    let joints = in_threads(qd.len(), |j| joint_figure(log, residuals, j, (&found, offset), &left[j]));
     let named = |k: &usize| match k.checked_sub(offset) {
         None => (None, PAYLOAD_PARAMETERS[*k]),
         Some(own) => (Some(own / OWN), JOINT_PARAMETERS[own % OWN]),
@@ -161,7 +163,7 @@ fn fitted(rows: &[usize], residuals: &ResidualTorques, signs: &[Vec<f64>], carri
     let joints = residuals.direct.len();
     let offset = if carried.is_some() { CARRIED } else { 0 };
     // joints are as noisy as they are strong: each counts in units of its own residual
-    let scales: Vec<f64> = residuals.direct.iter().map(|r| robust_spread(r).1.max(1e-12)).collect();
+    let scales: Vec<f64> = in_threads(joints, |j| robust_spread(&residuals.direct[j]).1.max(1e-12));
     let mut squares = LeastSquares::new(offset + OWN * joints);
     let mut row = vec![0.0; offset + OWN * joints];
     for (n, i) in rows.iter().enumerate() {
@@ -229,7 +231,7 @@ fn left_over(
         };
         (0..log.times.len()).map(left).collect()
     };
-    (0..residuals.direct.len()).map(of_joint).collect()
+    in_threads(residuals.direct.len(), of_joint)
 }
 
 fn joint_figure(

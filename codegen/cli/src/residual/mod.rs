@@ -14,6 +14,7 @@ use self::torques::{StateColumns, TorqueModel};
 use straightline_logs::align::AlignedLog;
 use straightline_logs::observer::Observer;
 use straightline_logs::smooth::LowPass;
+use straightline_logs::threads::in_threads;
 
 /// Residual torques of all rows of a log.
 #[derive(Clone, Debug)]
@@ -74,7 +75,7 @@ fn smoothed(log: &AlignedLog, columns: &StateColumns, filter: LowPass) -> (State
         }
         (values, rates)
     };
-    columns.iter().map(one).unzip()
+    in_threads(columns.len(), |k| one(&columns[k])).into_iter().unzip()
 }
 
 /// p = H q̇, and what lets it grow, τ + f.
@@ -87,9 +88,9 @@ fn momentum_and_force(model: &TorqueModel, log: &AlignedLog) -> (StateColumns, S
 }
 
 fn observed(log: &AlignedLog, [momentum, force]: [&StateColumns; 2], observer: Observer) -> StateColumns {
-    let joint = |(p, f): (&Vec<f64>, &Vec<f64>)| -> Vec<f64> {
+    in_threads(momentum.len(), |j| {
+        let (p, f) = (&momentum[j], &force[j]);
         let of = |s: &std::ops::Range<usize>| observer.residuals(&log.times[s.clone()], &p[s.clone()], &f[s.clone()]);
         log.segments.iter().flat_map(of).collect()
-    };
-    momentum.iter().zip(force).map(joint).collect()
+    })
 }

@@ -9,6 +9,7 @@ use straightline_codegen::Function;
 use straightline_core::model::Model;
 use straightline_graph::Scalar;
 use straightline_jit::{BatchLayout, LoadError, LoadedFunction, Robot};
+use straightline_logs::threads::processors;
 
 /// Columns of numbers: one per coordinate, with a number per state.
 pub type StateColumns = Vec<Vec<f64>>;
@@ -97,7 +98,7 @@ impl TorqueModel {
     ) -> StateColumns {
         let function = self.robot.function(name).expect("the robot was loaded with it");
         let states = inputs.first().and_then(|columns| columns.first()).map_or(0, Vec::len);
-        let threads = std::thread::available_parallelism().map_or(1, usize::from);
+        let threads = processors();
         let each = states.div_ceil(threads).max(CHUNK);
         let part = |first: usize| {
             let mut columns = vec![Vec::with_capacity(each.min(states - first)); self.model.nv()];
