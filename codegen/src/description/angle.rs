@@ -146,7 +146,7 @@ pub(crate) fn of_point(y: f64, x: f64) -> f64 {
         let along = x * cos + y * sin;
         // of the point at the origin there is no angle
         if along.to_f64() != 0.0 {
-            angle = angle + (y * cos - x * sin) / along;
+            angle += (y * cos - x * sin) / along;
         }
     }
     angle.to_f64()
