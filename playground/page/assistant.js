@@ -39,7 +39,7 @@ function assistant() {
       for (const done of waiting.values()) done({ failure: event.message || "the worker stopped" });
       waiting.clear();
     };
-    worker.postMessage({ id: next++, name: "start", module: compilerModule });
+    if (compilerModule) worker.postMessage({ id: next++, name: "start", module: compilerModule });
   };
   return {
     ask: (name, request) => new Promise((done) => {
@@ -48,8 +48,8 @@ function assistant() {
       waiting.set(id, done);
       worker.postMessage({ id, name, request });
     }),
-    stop: () => {
-      if (!waiting.size) return;
+    stop: (always) => {
+      if (!worker || !(always || waiting.size)) return;
       worker.terminate();
       worker = null;
       for (const done of waiting.values()) done(null);

@@ -147,7 +147,7 @@ function showSliders() {
       show();
     });
     show();
-    group("Motors (made up for the joint's greatest torque, until you say more)", node("div", { class: "row" }, node("span", { text: "Of " }), choice), own);
+    group("Motors (made up to suit the motion, until you say more)", node("div", { class: "row" }, node("span", { text: "Of " }), choice), own);
   }
   byId("sliders-box").hidden = false;
 }

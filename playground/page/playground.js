@@ -154,11 +154,16 @@ async function begin() {
   byId("example").append(...Object.keys(EXAMPLES).map((name) => node("option", { value: name, text: name })));
   say("Unpacking the compiler …");
   try {
-    const packed = Uint8Array.from(atob(byId("compiler").textContent), (c) => c.charCodeAt(0));
+    const raw = atob(byId("compiler").textContent);
+    const size = Number(byId("compiler").dataset.size);
     byId("compiler").remove();
-    const stream = new Blob([packed]).stream().pipeThrough(new DecompressionStream("deflate-raw"));
-    compilerModule = await WebAssembly.compile(await new Response(stream).arrayBuffer());
+    const packed = new Uint8Array(raw.length);
+    for (let k = 0; k < raw.length; k++) packed[k] = raw.charCodeAt(k);
     workerAddress = URL.createObjectURL(new Blob([byId("worker").textContent], { type: "text/javascript" }));
+    const { module, failure } = await bencher.ask("unpack", { packed, size });
+    if (failure) throw new Error(failure);
+    compilerModule = module;
+    bencher.stop(true);
   } catch (error) {
     return say(`This browser cannot run the compiler: ${error.message}`, true);
   }

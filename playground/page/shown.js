@@ -71,20 +71,21 @@ function showWaterfall() {
   byId("waterfall").hidden = !report;
   byId("explain").hidden = !!report;
   if (!report) return;
-  const names = Object.keys(report.functions).filter((name) => report.functions[name].waterfall);
+  const names = Object.keys(report.functions).filter((name) => report.functions[name].savings);
   if (choice.dataset.of !== names.join()) {
     choice.replaceChildren(...names.map((name) => node("option", { value: name, text: name })));
     choice.dataset.of = names.join();
   }
-  const water = report.functions[choice.value] && report.functions[choice.value].waterfall;
-  if (!water) return;
+  const water = report.functions[choice.value];
+  if (!water || !water.savings) return;
   const flops = (c) => c.mul + c.add + c.div + c.sqrt;
   const all = flops(water.plain);
+  const most = Math.max(all, ...water.savings.map(({ after }) => flops(after)));
   const bar = (from, to, kind) => {
     const cell = node("td", { class: "bar", "aria-hidden": "true" });
     const piece = node("span", { class: kind });
-    piece.style.marginLeft = `${(100 * Math.min(from, to)) / all}%`;
-    piece.style.width = `${Math.max(0.4, (100 * Math.abs(to - from)) / all)}%`;
+    piece.style.marginLeft = `${(100 * Math.min(from, to)) / most}%`;
+    piece.style.width = `${Math.max(0.4, (100 * Math.abs(to - from)) / most)}%`;
     cell.append(piece);
     return cell;
   };

@@ -168,7 +168,8 @@ onmessage = ({ data: { id, name, request, module } }) => {
   if (name === "start") return postMessage({ id, answer: {} });
   let answer;
   try {
-    answer = name === "bench" ? bench(request) : asked(name, request);
+    if (name === "unpack") answer = { module: new WebAssembly.Module(unpacked(request.packed, request.size)) };
+    else answer = name === "bench" ? bench(request) : asked(name, request);
   } catch (error) {
     answer = { failure: error.message };
   }

@@ -181,12 +181,14 @@ pub fn read_robot(request: &BenchRequest) -> Result<BenchRobot, Vec<Complaint>> 
     };
     let bare = read(&request.files.options("", quick.clone()))?;
     let tip = tip(&bare);
-    let is_bare = bare.drives.is_empty();
-    let motors = if request.motors.is_empty() || !is_bare { assumed(&bare) } else { request.motors.clone() };
+    let period = if request.period > 0.0 { request.period } else { USUAL_PERIOD };
+    let motors = match request.motors.is_empty() || !bare.drives.is_empty() {
+        true => assumed(&bare, &rows(&bare, USUAL_PERIOD, columns(&bare))),
+        false => request.motors.clone(),
+    };
     let added = payload_table(request, tip.as_deref()) + &tables(&motors);
     let options = request.files.options(&added, quick);
     let model = read(&options)?;
-    let period = if request.period > 0.0 { request.period } else { USUAL_PERIOD };
     let rows = rows(&model, period, columns(&model));
     Ok(BenchRobot { source, options, scene: format!("{}{added}", request.files.scene), tip, motors, model, rows })
 }

@@ -3,8 +3,9 @@
 
 use crate::base64;
 use crate::bench::{read_robot, BenchRequest};
+use crate::motion::SwingRows;
 use serde::{Deserialize, Serialize};
-use straightline_core::algorithms::{drive_demands, inverse_orders, reads_states};
+use straightline_core::algorithms::{drive_demands, inverse_dynamics, inverse_orders, reads_states};
 use straightline_core::drive::{Actuator, Drive};
 use straightline_core::model::{Joint, Model};
 use straightline_core::Taylor;
@@ -33,26 +34,27 @@ pub struct JointMotor {
 /// The air \[°C\], and what a winding bears.
 const AIR: f64 = 25.0;
 const HOTTEST: f64 = 155.0;
-/// Where a file gives no greatest torque \[N·m or N\].
-const USUAL_EFFORT: f64 = 50.0;
+
+/// Of a made-up motor: how many times what the motion asks of it it bears, or what its joint bears where that is less; and at least so much \[N·m or N\].
+const MARGIN: f64 = 2.5;
+const LEAST_EFFORT: f64 = 1.0;
 
 impl JointMotor {
-    /// A made-up motor that holds the joint's greatest torque with its greatest current.
-    pub fn assumed(joint: &Joint) -> JointMotor {
-        let effort =
-            Some(joint.limits.effort).filter(|effort| effort.is_finite() && *effort > 0.0).unwrap_or(USUAL_EFFORT);
+    /// A made-up motor for a joint that is asked for this at most.
+    pub fn assumed(joint: &Joint, asked: f64) -> JointMotor {
+        let limit = Some(joint.limits.effort).filter(|effort| *effort > 0.0).unwrap_or(f64::INFINITY);
+        let effort = (MARGIN * asked).min(limit).max(LEAST_EFFORT);
         let ratio = if joint.kind.slides() { 400.0 } else { 100.0 };
         let current = 15.0;
-        let torque_constant = three_digits(effort / (ratio * current));
-        // motors that are alike: R grows as C_M², J as the torque to 5/3, roughly
-        let resistance = three_digits(0.5 * (torque_constant / 0.05) * (torque_constant / 0.05));
-        let rotor_inertia = three_digits(3e-5 * torque_constant / 0.05);
+        let torque_constant = two_digits(effort / (ratio * current));
+        // motors that are alike: resistance and inertia of rotors grow with the torque constant
+        let size = torque_constant / 0.05;
         JointMotor {
             joint: joint.name.clone(),
             ratio,
             torque_constant,
-            resistance: resistance.clamp(0.05, 20.0),
-            rotor_inertia,
+            resistance: two_digits(0.5 * size.clamp(0.1, 40.0)),
+            rotor_inertia: two_digits(3e-5 * size),
             voltage: 48.0,
             current,
             thermal_resistance: 3.0,
@@ -81,8 +83,8 @@ impl JointMotor {
     }
 }
 
-fn three_digits(x: f64) -> f64 {
-    format!("{x:.2e}").parse().unwrap_or(x)
+fn two_digits(x: f64) -> f64 {
+    format!("{x:.1e}").parse().unwrap_or(x)
 }
 
 /// A string of TOML.
@@ -95,12 +97,18 @@ pub fn tables(motors: &[JointMotor]) -> String {
     motors.iter().map(JointMotor::table).collect()
 }
 
-/// Motors for all joints with one coordinate, of a robot that has none.
-pub fn assumed(model: &Model<f64>) -> Vec<JointMotor> {
-    match model.drives.is_empty() && model.closure.is_empty() {
-        true => model.independent_joints().filter(|j| j.kind.is_single()).map(JointMotor::assumed).collect(),
-        false => Vec::new(),
+/// Motors for all joints with one coordinate, of a robot that has none, as its motion asks for.
+pub fn assumed(model: &Model<f64>, rows: &SwingRows) -> Vec<JointMotor> {
+    if !(model.drives.is_empty() && model.closure.is_empty()) {
+        return Vec::new();
     }
+    let mut asked = vec![0.0f64; model.nv()];
+    for [q, qd, qdd] in &rows.states {
+        let tau = inverse_dynamics(model, q, qd, qdd);
+        asked.iter_mut().zip(tau).for_each(|(most, x)| *most = most.max(x.abs()));
+    }
+    let joints = model.independent_joints().filter(|joint| joint.kind.is_single());
+    joints.map(|joint| JointMotor::assumed(joint, asked[joint.iv])).collect()
 }
 
 /// Torques that the robot's functions gave.
@@ -118,7 +126,7 @@ pub struct DrivesRequest {
 pub struct DrivesAnswer {
     /// Of each drive what it bears.
     pub drives: Vec<DriveLimits>,
-    /// Currents \[A\], voltages \[V\], speeds of motors \[rad/s\] and Joule heat \[W\], each row by row, as base64 of f64.
+    /// Currents \[A\], voltages \[V\], speeds of motors \[rad/s\] and Joule heat \[W\], each drive by drive, row by row, as base64 of f64.
     pub current: String,
     /// See there.
     pub input: String,
@@ -176,22 +184,23 @@ pub fn answer(request: DrivesRequest) -> DrivesAnswer {
     if !follows_at_once || reads_states(&model.drives) {
         return refused("these drives have inductances or elastic transmissions, which need further derivatives: `straightline analyze` has them");
     }
-    let mut found = [const { Vec::new() }; 4];
+    // of each quantity drive by drive, row by row
+    let mut found = [const { Vec::new() }; 4].map(|none| vec![none; model.drives.len()]);
     for (row, [q, qd, qdd]) in rows.iter().enumerate() {
         let own = &tau[row * model.nv()..(row + 1) * model.nv()];
         let demands = drive_demands::<f64, 1>(1, model, q, &[qd, qdd], &[], |_, _, _, _| {
             own.iter().map(|force| Taylor::fixed(*force)).collect()
         });
-        for (drive, demand) in model.drives.iter().zip(&demands) {
+        for (k, (drive, demand)) in model.drives.iter().zip(&demands).enumerate() {
             let current = demand.current.unwrap_or(0.0);
             let heat = match &drive.actuator {
                 Actuator::Motor(motor) => motor.resistance * current * current,
                 Actuator::Linear(_) => 0.0,
             };
             let all = [current, demand.input, demand.shafts[0][1], heat];
-            found.iter_mut().zip(all).for_each(|(column, x)| column.push(x));
+            found.iter_mut().zip(all).for_each(|(columns, x)| columns[k].push(x));
         }
     }
-    let [current, input, speed, joule] = found.map(|numbers| base64::of_numbers(&numbers));
+    let [current, input, speed, joule] = found.map(|columns| base64::of_numbers(columns.iter().flatten()));
     DrivesAnswer { drives: model.drives.iter().map(limits).collect(), current, input, speed, joule, why_not: None }
 }

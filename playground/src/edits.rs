@@ -74,7 +74,7 @@ fn multiplied(text: &str, place: &Place, most: usize, factor: f64) -> Option<Vec
 fn of_mass(text: &str, description: &Description, link: &str, factor: f64) -> Option<Vec<TextEdit>> {
     let inertial = description.link(link)?.inertial.as_ref()?;
     let mass = multiplied(text, &inertial.mass.place, 1, factor)?;
-    Some([mass, multiplied(text, &inertial.inertia.place, 6, factor)?].concat())
+    Some([mass, multiplied(text, &inertial.inertia.place, usize::MAX, factor)?].concat())
 }
 
 /// The edits that put a joint so many times as far from its parent.

@@ -63,7 +63,7 @@ const press = {
   right: () => key("ArrowRight", { keyCode: 39 }), compile: () => key("Enter", { keyCode: 13, modifiers: 2 }), all: () => key("a", { keyCode: 65, code: "KeyA", modifiers: 2 }),
 };
 async function tabTo(id) {
-  for (let k = 0; k < 80; k++) {
+  for (let k = 0; k < 200; k++) {
     if (await seen("document.activeElement.id") === id) return k;
     await press.tab();
   }

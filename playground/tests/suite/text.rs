@@ -3,7 +3,7 @@
 use super::support::{built, in_node, natively, robots};
 use serde_json::json;
 
-/// Robots of more bytes take minutes to compile in full: of them the page's five functions are compared.
+/// Of robots with more bytes the page's five functions are searched for in full, and all of them in one form.
 const SMALL: usize = 6_000;
 const FEW: [&str; 5] = ["inverse_dynamics", "forward_dynamics", "mass_matrix", "gravity_force", "forward_kinematics"];
 
@@ -13,21 +13,21 @@ fn the_text_of_every_robot_is_that_of_the_native_compiler_to_the_byte() {
     let mut total = 0;
     for (name, text) in robots() {
         let functions: &[&str] = if text.len() > SMALL { &FEW } else { &[] };
-        let request = json!({ "name": name, "text": text, "functions": functions });
-        let (found, milliseconds) = node.ask("compile", &request);
-        let expected = natively("compile", &request);
-        let (found_text, expected_text) = (found["text"].as_str(), expected["text"].as_str());
-        let expected_text = expected_text.unwrap_or_else(|| panic!("{name}: {:?}", expected["complaints"]));
-        if found_text != Some(expected_text) {
-            let other = found_text.unwrap_or_default().lines().zip(expected_text.lines()).find(|(a, b)| a != b);
-            panic!("{name} differs: {other:?} {:?}", found["failure"]);
+        let full = json!({ "name": name, "text": text, "functions": functions });
+        let quick = json!({ "name": name, "text": text, "quick": true });
+        for (form, request) in [("full", full), ("quick", quick)] {
+            let (found, milliseconds) = node.ask("compile", &request);
+            let expected = natively("compile", &request);
+            let (found_text, expected_text) = (found["text"].as_str(), expected["text"].as_str());
+            let expected_text = expected_text.unwrap_or_else(|| panic!("{name}: {:?}", expected["complaints"]));
+            if found_text != Some(expected_text) {
+                let other = found_text.unwrap_or_default().lines().zip(expected_text.lines()).find(|(a, b)| a != b);
+                panic!("{name} differs: {other:?} {:?}", found["failure"]);
+            }
+            assert_eq!(found, expected, "{name}: report and complaints");
+            println!("{name}, {form}: {} bytes alike, {milliseconds:.0} ms in node", expected_text.len());
+            total += expected_text.len();
         }
-        assert_eq!(found, expected, "{name}: report and complaints");
-        println!(
-            "{name}: {} bytes of text alike, in the browser's compiler after {milliseconds:.0} ms",
-            expected_text.len()
-        );
-        total += expected_text.len();
     }
     assert!(total > 100_000, "{total}");
 }

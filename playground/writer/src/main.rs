@@ -1,14 +1,12 @@
-//! Writes the page: `straightline-playground-writer COMPILER.wasm PAGE.html`, from the module that is built for wasm32. It knows no robotics, so that the page is
+//! Writes the page: `straightline-playground-writer COMPILER.wasm COMPILER.wasm.lzma PAGE.html`, from the module that is built for wasm32. It knows no robotics, so that the page is
 //! written without building the compiler a second time.
 //!
-//! One file that asks for nothing: the module packed by DEFLATE, which browsers unpack, script, style, and the robots of the repository as examples. What the
+//! One file that asks for nothing: the module packed by LZMA, which the page unpacks, script, style, and the robots of the repository as examples. What the
 //! page may do is told to the browser by hashes: it runs its own scripts, and workers and modules that it made itself, and has no network.
 
 use base64::{engine::general_purpose::STANDARD, Engine};
-use flate2::{write::DeflateEncoder, Compression};
 use sha2::{Digest, Sha256};
 use std::error::Error;
-use std::io::Write;
 use std::path::{Path, PathBuf};
 use std::{env, fs};
 
@@ -82,19 +80,16 @@ fn examples() -> Result<String, Box<dyn Error>> {
 
 fn main() -> Result<(), Box<dyn Error>> {
     let arguments: Vec<String> = env::args().skip(1).collect();
-    let [module, page] = &arguments[..] else {
-        return Err("straightline-playground-writer COMPILER.wasm PAGE.html".into());
+    let [module, packed, page] = &arguments[..] else {
+        return Err("straightline-playground-writer COMPILER.wasm COMPILER.wasm.lzma PAGE.html".into());
     };
-    let module = fs::read(module)?;
-    let mut packer = DeflateEncoder::new(Vec::new(), Compression::best());
-    packer.write_all(&module)?;
-    let packed = packer.finish()?;
+    let (module, packed) = (fs::read(module)?, fs::read(packed)?);
     let (view_style, view_body) = view_parts()?;
     let style = format!("{view_style}{}", file("page/playground.css")?);
     let parts = ["assistant.js", "shown.js", "bench.js", "playground.js"];
     let parts: Result<String, _> = parts.iter().map(|name| file(&format!("page/{name}"))).collect();
     let script = format!("{}{}", parts?, view_script()?);
-    let worker = file("page/worker.js")?;
+    let worker = format!("{}{}", file("page/lzma.js")?, file("page/worker.js")?);
     let hash = |text: &str| format!("'sha256-{}'", STANDARD.encode(Sha256::digest(text.as_bytes())));
     let policy = format!(
         "default-src 'none'; script-src {} 'wasm-unsafe-eval'; worker-src blob:; style-src {}; base-uri 'none'; form-action 'none'",
@@ -109,9 +104,10 @@ fn main() -> Result<(), Box<dyn Error>> {
          <meta name=\"viewport\" content=\"width=device-width, initial-scale=1\">\n<meta name=\"color-scheme\" content=\"light dark\">\n\
          <title>Straightline playground</title>\n<style>{style}</style>\n</head>\n<body>\n{}<template id=\"view-template\">{view_body}</template>\n\
          <script type=\"application/json\" id=\"examples\">{}</script>\n<script type=\"text/plain\" id=\"worker\">{worker}</script>\n\
-         <script type=\"text/plain\" id=\"compiler\">{}</script>\n<script>{script}</script>\n</body>\n</html>\n",
+         <script type=\"text/plain\" id=\"compiler\" data-size=\"{}\">{}</script>\n<script>{script}</script>\n</body>\n</html>\n",
         file("page/playground.html")?,
         examples()?,
+        module.len(),
         STANDARD.encode(&packed)
     );
     fs::write(page, &html)?;
