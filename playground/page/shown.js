@@ -75,6 +75,7 @@ function showWaterfall() {
   if (choice.dataset.of !== names.join()) {
     choice.replaceChildren(...names.map((name) => node("option", { value: name, text: name })));
     choice.dataset.of = names.join();
+    if (names.includes("inverse_dynamics")) choice.value = "inverse_dynamics";
   }
   const water = report.functions[choice.value];
   if (!water || !water.savings) return;

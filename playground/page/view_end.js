@@ -1,4 +1,10 @@
   // what the page around it asks: to stop, and to go on with other numbers of the same robot
+  const hide = (name, text) => {
+    layers.set(name, false);
+    for (const label of at("layers").querySelectorAll("label")) if (label.textContent.trim() === text) label.querySelector("input").checked = false;
+  };
+  // torques are looked at here, and large ellipsoids stand before them
+  if (!asked.has("show")) hide("ellipsoids", "inertia ellipsoids");
   return {
     stop() {
       play(false);
