@@ -28,7 +28,7 @@ function showLimits(bench) {
     const over = has && of.size > limit * (1 + 1e-12);
     if (over) exceeded++;
     const verdict = !has ? "no limit given" : over ? `exceeded by ${saidNumber(100 * (of.size / limit - 1))} %${of.when === undefined ? "" : ` at ${saidNumber(of.when)} s`}` : `within, ${saidNumber((100 * of.size) / limit, 2)} %`;
-    rows.push([what, `${saidNumber(of.size)} ${unit}`, has ? `${saidNumber(limit)} ${unit}` : "–", node("td", { class: over ? "exceeded" : "", text: verdict })]);
+    rows.push([what, `${saidNumber(of.size)}\u00a0${unit}`, has ? `${saidNumber(limit)}\u00a0${unit}` : "–", node("td", { class: over ? "exceeded" : "", text: verdict })]);
   };
   const { joints, tau, nv, drives } = bench;
   const times = decode(bench.times);

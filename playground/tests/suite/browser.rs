@@ -74,7 +74,7 @@ fn complaints(name: &str, text: &str) -> Value {
 fn value(rows: &Value, what: &str) -> f64 {
     let row = rows.as_array().unwrap().iter().find(|row| row[0].as_str() == Some(what));
     let text = row.unwrap_or_else(|| panic!("no {what} in {rows}"))[1].as_str().unwrap();
-    text.split(' ').next().unwrap().replace('\u{2212}', "-").parse().unwrap()
+    text.split('\u{a0}').next().unwrap().replace('\u{2212}', "-").parse().unwrap()
 }
 
 #[test]
