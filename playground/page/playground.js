@@ -123,11 +123,13 @@ function listen() {
     if (event.dataTransfer.files[0]) openFile(event.dataTransfer.files[0]);
   });
   byId("reset").addEventListener("click", compile);
-  byId("take").addEventListener("click", () => {
-    if (!state.bench || !state.bench.text) return;
+  byId("take").addEventListener("click", async () => {
+    const { factors, payload, period, motors, round } = state;
+    const bench = await bencher.ask("bench", { ...files(), factors, payload, period, motors, whole: true });
+    if (!bench || !bench.text || round !== state.round) return;
     state.bytes = null;
-    byId("robot").value = state.bench.text;
-    byId("scene").value = state.bench.scene.trim() === byId("scene").value.trim() ? byId("scene").value : state.bench.scene;
+    byId("robot").value = bench.text;
+    byId("scene").value = bench.scene;
     byId("scene-box").open = true;
     compile();
   });

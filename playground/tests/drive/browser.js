@@ -187,6 +187,13 @@ const SCENARIOS = {
     await seen("document.getElementById('reset').click()");
     await done();
     found.after = await limits();
+    // what sliders say is written into both files
+    await move("forearm_link", "Math.log(2)");
+    await seen("delete document.body.dataset.done");
+    await seen("document.getElementById('take').click()");
+    await done();
+    found.taken = await seen(`[/mass value="4\\.5[45]/.test(document.getElementById("robot").value), document.getElementById("scene").value.split("[[drive]]").length - 1]`);
+    found.takenLimits = await limits();
     return { ...(await seen(FACTS)), ...found };
   },
   // texts of a file: [{ name, text }], what the page says of each

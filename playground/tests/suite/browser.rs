@@ -90,7 +90,10 @@ fn sliders_change_torques_currents_and_heat_and_the_file_comes_back() {
     assert_eq!(value(&seen["hotter"], torque), value(&seen["longer"], torque));
     let heat = "shoulder_pan_joint: Joule heat, mean";
     assert!(value(&seen["hotter"], heat) > 1.5 * value(&seen["longer"], heat));
+    assert_eq!(seen["milliseconds"]["compiled"], 0, "other motors are no other functions");
     assert_eq!(seen["after"], seen["before"]);
+    assert_eq!(seen["taken"], json!([true, 6]), "the file has the mass, the scene the motors");
+    assert!((value(&seen["takenLimits"], torque) - value(&seen["heavier"], torque)).abs() < 1e-9);
 }
 
 #[test]

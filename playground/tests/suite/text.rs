@@ -33,7 +33,7 @@ fn the_text_of_every_robot_is_that_of_the_native_compiler_to_the_byte() {
 }
 
 #[test]
-fn first_texts_of_arms_come_within_two_seconds() {
+fn first_texts_of_arms_come_at_once() {
     let Some(mut node) = in_node() else { return };
     for (name, text) in
         robots().into_iter().filter(|(name, _)| ["ur5.urdf", "puma560.urdf", "planar_2r.toml"].contains(&&**name))
@@ -41,7 +41,7 @@ fn first_texts_of_arms_come_within_two_seconds() {
         let (found, milliseconds) = node.ask("compile", &json!({ "name": name, "text": text, "quick": true }));
         println!("{name}: first text after {milliseconds:.0} ms");
         assert!(found["text"].is_string(), "{name}: {found}");
-        // ten times what it takes where nothing else runs: a busy machine is no error of the page
+        // 0.1 to 0.3 s where nothing else runs (`RECORD.md`); a busy machine is no error of the page
         assert!(milliseconds < 20_000.0, "{name}: {milliseconds} ms");
     }
 }
