@@ -208,16 +208,26 @@ fn without_webgl_the_page_says_so_and_shows_its_plots() {
     assert!(seen.document.contains("0.500 s</output>"));
 }
 
-/// What a script that is added to a page sees after its gestures: it writes into the page's title.
+/// What a script that is added to a page, which stands at 0.5 s, sees after its gestures: it writes into the page's title.
 fn told(name: &str, fragment: &str, script: &str) -> Option<String> {
     let model = arm();
     let page = written(&model, &ViewedRun::tour(&model));
     // no script but its own would run
     let page = page.replace("http-equiv=\"Content-Security-Policy\"", "name=\"policy\"");
-    let page = format!("{page}<script>setTimeout(() => {{ {script} }}, 200)</script>");
-    let seen = seen(name, &page, fragment, false, &["--disable-3d-apis"])?;
-    let title = seen.document.split("<title>").nth(1).and_then(|rest| rest.split("</title>").next());
-    Some(title.expect("a page has a title").to_string())
+    // once the page shows the time that it is asked for
+    let shown = "document.getElementById('clock').textContent.startsWith('0.500')";
+    let wait = format!("const go = () => {{ if (!{shown}) return setTimeout(go, 20); {script} }}; go();");
+    let page = format!("{page}<script>{{ {wait} }}</script>");
+    // a browser on a busy machine may end before it has drawn anything
+    for _ in 0..3 {
+        let seen = seen(name, &page, fragment, false, &["--disable-3d-apis"])?;
+        let title = seen.document.split("<title>").nth(1).and_then(|rest| rest.split("</title>").next());
+        let title = title.expect("a page has a title");
+        if !title.ends_with(": in motion") {
+            return Some(title.to_string());
+        }
+    }
+    panic!("the page never stood at 0.5 s");
 }
 
 /// The span that plots say they show, and the numbers at the first plot's time axis.
