@@ -1,0 +1,4 @@
+//! Tests of the cluster, in one binary.
+
+mod cluster;
+mod processes;

@@ -1,0 +1,8 @@
+//! Tests of the functions, in one binary.
+
+mod equations;
+mod helpers;
+mod lists;
+mod many;
+mod messages;
+mod rows;

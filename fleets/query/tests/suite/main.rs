@@ -1,0 +1,3 @@
+//! Tests of the command, in one binary.
+
+mod command;
