@@ -228,9 +228,8 @@ impl RegressorColumns {
         let list = base_parameter_lists(model, &[Function::TorqueRegressor]).into_iter().next();
         let (names, nominal, places) =
             list.map_or_else(Default::default, |list| (list.names, list.values, list.places));
-        let mut bodies: Vec<_> = model.bodies.iter().collect();
-        bodies.sort_by_key(|body| body.joint.iv);
-        let others = bodies.iter().map(|body| {
+        let bodies = model.bodies_in_order().into_iter().map(|b| &model.bodies[b]);
+        let others = bodies.map(|body| {
             let left = JointParameter::EVERY.into_iter().filter(|kind| !kinds.contains(kind));
             let left = left.map(|kind| (kind, kind.value(&body.effects).to_f64())).filter(|(_, x)| *x != 0.0);
             KnownEffects { effects: body.effects.map(|x| x.to_f64()), left: left.collect() }
