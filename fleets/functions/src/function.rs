@@ -1,18 +1,18 @@
 //! Functions whose results are a number per joint: a row of a table each.
 
+use crate::call::RobotCall;
 use crate::failure;
-use crate::robot::{carried, robot, FleetRobot, RobotUse};
-use crate::states::{check_type, columns, rows_with_all, states, taken_as, States};
-use crate::text::{can_be_robot, RobotFolder};
-use datafusion::arrow::array::{ArrayRef, StructArray};
+use crate::robot::{FleetRobot, RobotUse};
+use crate::states::{columns, rows_with_all, States};
+use crate::text::RobotFolder;
+use datafusion::arrow::array::StructArray;
 use datafusion::arrow::datatypes::{DataType, Field, FieldRef, Fields};
 use datafusion::common::exec_err;
 use datafusion::error::Result;
 use datafusion::logical_expr::simplify::{ExprSimplifyResult, SimplifyContext};
 use datafusion::logical_expr::{
-    ColumnarValue, Expr, ReturnFieldArgs, ScalarFunctionArgs, ScalarUDFImpl, Signature, Volatility,
+    ColumnarValue, Expr, ReturnFieldArgs, ScalarFunctionArgs, ScalarUDF, ScalarUDFImpl, Signature,
 };
-use datafusion::scalar::ScalarValue;
 use std::sync::Arc;
 use straightline_codegen::Function;
 use straightline_jit::BatchLayout;
@@ -62,18 +62,13 @@ pub static DYNAMICS: [DynamicsRow; 5] = [
 #[derive(Debug, PartialEq, Eq, Hash)]
 pub struct DynamicsFunction {
     row: &'static DynamicsRow,
-    folder: RobotFolder,
-    signature: Signature,
+    call: RobotCall,
 }
 
 impl DynamicsFunction {
     /// That row, of robots from that folder.
-    pub fn new(row: &'static DynamicsRow, folder: RobotFolder) -> DynamicsFunction {
-        DynamicsFunction { row, folder, signature: Signature::user_defined(Volatility::Immutable) }
-    }
-
-    fn robot(&self, literal: &ScalarValue) -> Result<Arc<FleetRobot>> {
-        robot(self.row.name, literal, &self.folder, RobotUse::Function(self.row.function))
+    pub fn new(row: &'static DynamicsRow, folder: &RobotFolder) -> DynamicsFunction {
+        DynamicsFunction { row, call: RobotCall::new(row.name, row.inputs, RobotUse::Function(row.function), folder) }
     }
 
     /// The results, a column per joint, block by block: what a block gives is copied to its columns while it is in cache, so that these need not be filled with
@@ -107,32 +102,9 @@ impl DynamicsFunction {
     }
 }
 
-/// The types that arguments are taken in.
-pub fn coerced(function: &str, inputs: &[&str], given: &[DataType]) -> Result<Vec<DataType>> {
-    let Some((robot, lists)) = given.split_first().filter(|(_, lists)| lists.len() == inputs.len()) else {
-        return Err(failure::arguments(function, inputs, given.len()));
-    };
-    if !can_be_robot(robot) {
-        return Err(failure::no_robot(function, &format!("of type {robot}")));
-    }
-    let taken =
-        |(name, kind): (&&str, &DataType)| taken_as(kind).ok_or_else(|| failure::no_numbers(function, name, kind));
-    let lists = inputs.iter().zip(lists).map(taken);
-    std::iter::once(Ok(robot.clone())).chain(lists).collect()
-}
-
 /// A number per joint.
 fn per_joint(robot: &FleetRobot) -> Fields {
     robot.joints.iter().map(|name| Field::new(name, DataType::Float64, true)).collect()
-}
-
-/// The robot's text in place of its name, in the arguments of a function.
-pub fn carrying(function: &str, args: &mut [Expr], folder: &RobotFolder, of: RobotUse) -> Result<bool> {
-    let Some(Expr::Literal(literal, _)) = args.first_mut() else { return Err(failure::robot_of_rows(function)) };
-    let text = carried(function, literal, folder, of)?;
-    let is_other = text != *literal;
-    *literal = text;
-    Ok(is_other)
 }
 
 impl ScalarUDFImpl for DynamicsFunction {
@@ -141,11 +113,11 @@ impl ScalarUDFImpl for DynamicsFunction {
     }
 
     fn signature(&self) -> &Signature {
-        &self.signature
+        &self.call.signature
     }
 
     fn coerce_types(&self, given: &[DataType]) -> Result<Vec<DataType>> {
-        coerced(self.row.name, self.row.inputs, given)
+        self.call.coerced(given)
     }
 
     fn return_type(&self, _: &[DataType]) -> Result<DataType> {
@@ -153,39 +125,19 @@ impl ScalarUDFImpl for DynamicsFunction {
     }
 
     fn return_field_from_args(&self, args: ReturnFieldArgs<'_>) -> Result<FieldRef> {
-        let Some(literal) = args.scalar_arguments.first().copied().flatten() else {
-            return Err(failure::robot_of_rows(self.row.name));
-        };
-        let robot = self.robot(literal)?;
-        let lists = self.row.inputs.iter().zip(&args.arg_fields[1..]).zip(self.lengths(&robot));
-        for ((name, field), length) in lists {
-            check_type(name, field.data_type(), &robot, length)?;
-        }
+        let robot = self.call.planned(&args, |robot| self.lengths(robot))?;
         Ok(Arc::new(Field::new(self.row.name, DataType::Struct(per_joint(&robot)), true)))
     }
 
-    fn simplify(&self, mut args: Vec<Expr>, _: &SimplifyContext) -> Result<ExprSimplifyResult> {
-        match carrying(self.row.name, &mut args, &self.folder, RobotUse::Function(self.row.function))? {
-            false => Ok(ExprSimplifyResult::Original(args)),
-            true => {
-                let function = DynamicsFunction::new(self.row, self.folder.clone());
-                let function = Arc::new(datafusion::logical_expr::ScalarUDF::from(function));
-                Ok(ExprSimplifyResult::Simplified(function.call(args)))
-            }
-        }
+    fn simplify(&self, args: Vec<Expr>, _: &SimplifyContext) -> Result<ExprSimplifyResult> {
+        let function = || ScalarUDF::from(DynamicsFunction { row: self.row, call: self.call.clone() });
+        self.call.simplified(args, function)
     }
 
     fn invoke_with_args(&self, args: ScalarFunctionArgs) -> Result<ColumnarValue> {
-        let Some(ColumnarValue::Scalar(literal)) = args.args.first() else {
-            return Err(failure::robot_of_rows(self.row.name));
-        };
-        let robot = self.robot(literal)?;
-        let rows = args.number_rows;
-        let arrays: Vec<ArrayRef> = args.args[1..].iter().map(|arg| arg.to_array(rows)).collect::<Result<_>>()?;
-        let lists = self.row.inputs.iter().zip(&arrays).zip(self.lengths(&robot));
-        let given: Vec<States<'_>> =
-            lists.map(|((name, array), length)| states(name, array, &robot, length)).collect::<Result<_>>()?;
-        let nulls = rows_with_all(&given);
+        let (robot, arrays) = self.call.executed(&args)?;
+        let given = self.call.states(&arrays, &robot, &self.lengths(&robot))?;
+        let (rows, nulls) = (args.number_rows, rows_with_all(&given));
         let columns = columns(self.columns(&robot, &given, rows)?, nulls.as_ref());
         let DataType::Struct(fields) = args.return_field.data_type() else {
             return exec_err!("`{}` gives a struct", self.row.name);

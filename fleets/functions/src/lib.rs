@@ -17,6 +17,7 @@
 //! ```
 
 pub mod bounded;
+mod call;
 mod exact;
 mod failure;
 mod function;
@@ -39,15 +40,14 @@ use normal_equations::RegressorNormalEquations;
 
 /// The functions of rows, of robots from that folder.
 pub fn scalar_functions(folder: &RobotFolder) -> Vec<ScalarUDF> {
-    let dynamics = DYNAMICS.iter().map(|row| ScalarUDF::from(DynamicsFunction::new(row, folder.clone())));
-    let others =
-        [ScalarUDF::from(LimitsExceeded::new(folder.clone())), ScalarUDF::from(IdentifiedParameters::default())];
+    let dynamics = DYNAMICS.iter().map(|row| ScalarUDF::from(DynamicsFunction::new(row, folder)));
+    let others = [ScalarUDF::from(LimitsExceeded::new(folder)), ScalarUDF::from(IdentifiedParameters::default())];
     dynamics.chain(others).collect()
 }
 
 /// The aggregates, of robots from that folder.
 pub fn aggregate_functions(folder: &RobotFolder) -> Vec<AggregateUDF> {
-    vec![AggregateUDF::from(RegressorNormalEquations::new(folder.clone()))]
+    vec![AggregateUDF::from(RegressorNormalEquations::new(folder))]
 }
 
 /// Gives all of them to a session.

@@ -2,11 +2,11 @@
 //!
 //! Products are rounded, sums exact ([`ExactSums`]): so the result has the same bits whatever the partitions, and parts of a fleet may be added in any order.
 
+use crate::call::RobotCall;
 use crate::exact::ExactSums;
 use crate::failure;
-use crate::function::{carrying, coerced};
-use crate::robot::{robot, FleetRobot, RegressorColumns, RobotUse};
-use crate::states::{rows_with_all, states, States};
+use crate::robot::{FleetRobot, RegressorColumns, RobotUse};
+use crate::states::{rows_with_all, States};
 use crate::text::RobotFolder;
 use datafusion::arrow::array::{
     Array, ArrayRef, AsArray, Float64Array, ListArray, StringArray, StructArray, UInt64Array,
@@ -15,7 +15,7 @@ use datafusion::arrow::buffer::OffsetBuffer;
 use datafusion::arrow::datatypes::{DataType, Field, FieldRef, Fields, UInt64Type};
 use datafusion::error::Result;
 use datafusion::logical_expr::function::{AccumulatorArgs, AggregateFunctionSimplification, StateFieldsArgs};
-use datafusion::logical_expr::{Accumulator, AggregateUDF, AggregateUDFImpl, Expr, Signature, Volatility};
+use datafusion::logical_expr::{Accumulator, AggregateUDF, AggregateUDFImpl, Expr, Signature};
 use datafusion::physical_expr::expressions::Literal;
 use datafusion::scalar::ScalarValue;
 use std::sync::Arc;
@@ -28,15 +28,12 @@ const CHUNK: usize = 256;
 
 /// `regressor_normal_equations(robot, q, qd, qdd, effort)`.
 #[derive(Debug, PartialEq, Eq, Hash)]
-pub struct RegressorNormalEquations {
-    folder: RobotFolder,
-    signature: Signature,
-}
+pub struct RegressorNormalEquations(RobotCall);
 
 impl RegressorNormalEquations {
     /// Of robots from that folder.
-    pub fn new(folder: RobotFolder) -> RegressorNormalEquations {
-        RegressorNormalEquations { folder, signature: Signature::user_defined(Volatility::Immutable) }
+    pub fn new(folder: &RobotFolder) -> RegressorNormalEquations {
+        RegressorNormalEquations(RobotCall::new(NAME, &INPUTS, RobotUse::Regressor, folder))
     }
 }
 
@@ -61,11 +58,11 @@ impl AggregateUDFImpl for RegressorNormalEquations {
     }
 
     fn signature(&self) -> &Signature {
-        &self.signature
+        &self.0.signature
     }
 
     fn coerce_types(&self, given: &[DataType]) -> Result<Vec<DataType>> {
-        coerced(NAME, &INPUTS, given)
+        self.0.coerced(given)
     }
 
     fn return_type(&self, _: &[DataType]) -> Result<DataType> {
@@ -78,24 +75,21 @@ impl AggregateUDFImpl for RegressorNormalEquations {
     }
 
     fn simplify(&self) -> Option<AggregateFunctionSimplification> {
-        let folder = self.folder.clone();
+        let own = self.0.clone();
         Some(Box::new(move |mut call, _| {
-            let text = carrying(NAME, &mut call.params.args, &folder, RobotUse::Regressor)?;
-            if text {
-                call.func = Arc::new(AggregateUDF::from(RegressorNormalEquations::new(folder.clone())));
+            if own.carrying(&mut call.params.args)? {
+                call.func = Arc::new(AggregateUDF::from(RegressorNormalEquations(own.clone())));
             }
             Ok(Expr::AggregateFunction(call))
         }))
     }
 
     fn accumulator(&self, args: AccumulatorArgs<'_>) -> Result<Box<dyn Accumulator>> {
-        let Some(literal) = args.exprs.first().and_then(|expr| expr.downcast_ref::<Literal>()) else {
-            return Err(failure::robot_of_rows(NAME));
-        };
-        let robot = robot(NAME, literal.value(), &self.folder, RobotUse::Regressor)?;
+        let literal = args.exprs.first().and_then(|expr| expr.downcast_ref::<Literal>());
+        let robot = self.0.robot(literal.map(Literal::value))?;
         match robot.refusal() {
             Some(why) => Err(failure::refused(NAME, &robot.name, &why)),
-            None => Ok(Box::new(EquationSums::of(robot))),
+            None => Ok(Box::new(EquationSums::of(self.0.clone(), robot))),
         }
     }
 }
@@ -103,6 +97,7 @@ impl AggregateUDFImpl for RegressorNormalEquations {
 /// What is summed up.
 #[derive(Debug)]
 struct EquationSums {
+    call: RobotCall,
     robot: Arc<FleetRobot>,
     /// Per joint the columns of its row that are not zero everywhere, in their order.
     columns: Vec<Vec<usize>>,
@@ -117,12 +112,12 @@ pub fn in_triangle(columns: usize, row: usize, column: usize) -> usize {
 }
 
 impl EquationSums {
-    fn of(robot: Arc<FleetRobot>) -> EquationSums {
+    fn of(call: RobotCall, robot: Arc<FleetRobot>) -> EquationSums {
         let mut of_joint = vec![Vec::new(); robot.joints.len()];
         let found = columns(&robot);
         found.places.iter().for_each(|[row, column]| of_joint[*row].push(*column));
         let n = found.names.len();
-        EquationSums { columns: of_joint, rows: 0, sums: ExactSums::zero(n * (n + 1) / 2 + n + 1), robot }
+        EquationSums { call, columns: of_joint, rows: 0, sums: ExactSums::zero(n * (n + 1) / 2 + n + 1), robot }
     }
 
     /// Adds the products of one joint's equation: its row of the regressor, and what it is to add up to.
@@ -177,10 +172,8 @@ fn list<A: Array + 'static>(values: A) -> ArrayRef {
 
 impl Accumulator for EquationSums {
     fn update_batch(&mut self, values: &[ArrayRef]) -> Result<()> {
-        let joints = self.robot.joints.len();
-        let lists = INPUTS.iter().zip(&values[1..]);
-        let given: Vec<States<'_>> =
-            lists.map(|(name, array)| states(name, array, &self.robot, joints)).collect::<Result<_>>()?;
+        let robot = self.robot.clone();
+        let given = self.call.states(&values[1..], &robot, &[robot.joints.len(); INPUTS.len()])?;
         let rows = values[0].len();
         self.add_rows(&given, rows)
     }
