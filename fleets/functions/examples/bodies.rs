@@ -2,19 +2,20 @@
 //!
 //! `cargo run --release --example bodies`, on a machine that does nothing else. Each figure is the best of several, as others disturb in one direction alone.
 
-use datafusion::arrow::array::{Array, ArrayRef, AsArray, Float64Builder, ListBuilder};
-use datafusion::arrow::datatypes::{Field, Float64Type};
+use datafusion::arrow::array::{Array, ArrayRef, AsArray, RecordBatch};
+use datafusion::arrow::datatypes::{Field, Float64Type, Schema};
 use datafusion::error::Result;
 use datafusion::logical_expr::{col, lit, ColumnarValue, Expr, ReturnFieldArgs, ScalarFunctionArgs};
 use datafusion::prelude::SessionContext;
 use std::hint::black_box;
-use std::path::PathBuf;
 use std::sync::Arc;
 use std::time::Instant;
 use straightline_codegen::choices::OptimisationTier;
 use straightline_codegen::diagnostic::Source;
 use straightline_codegen::options::Options;
 use straightline_codegen::Function;
+use straightline_fleet_testing::log::log_at;
+use straightline_fleet_testing::{robot_text, robots};
 use straightline_fleets::{scalar_functions, RobotFolder};
 use straightline_jit::{BatchLayout, Robot};
 
@@ -25,26 +26,6 @@ const BATCH: usize = 8192;
 const CALLS: usize = 20;
 /// Each figure is the best of so many.
 const TRIES: usize = 15;
-
-fn robots() -> PathBuf {
-    PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("../../robots/descriptions")
-}
-
-/// q, q̇ and q̈ of joints that swing, to four decimals.
-fn lists() -> [ArrayRef; 3] {
-    [0, 1, 2].map(|order| {
-        let mut list = ListBuilder::new(Float64Builder::new());
-        for row in 0..BATCH {
-            let joint = |k: usize| {
-                let w = 0.9 + 0.4 * k as f64;
-                let (sine, cosine) = (w * row as f64 / 1000.0).sin_cos();
-                ([0.7 * sine, 0.7 * w * cosine, -0.7 * w * w * sine][order] * 1e4).round() / 1e4
-            };
-            list.append_value((0..JOINTS).map(|k| Some(joint(k))));
-        }
-        Arc::new(list.finish()) as ArrayRef
-    })
-}
 
 /// The least time of several \[s\].
 fn best(mut work: impl FnMut()) -> f64 {
@@ -58,9 +39,9 @@ fn best(mut work: impl FnMut()) -> f64 {
 
 /// The plain loop.
 fn plain(function: Function, numbers: &[&[f64]]) -> f64 {
-    let text = std::fs::read_to_string(robots().join("panda.urdf")).expect("a robot of the project");
     let options = Options { functions: vec![function], optimise: OptimisationTier::Quick, ..Options::default() };
-    let robot = Robot::<f64>::load(&Source::new("panda.urdf", text), &options).expect("a robot of the project");
+    let robot = Robot::<f64>::load(&Source::new("panda.urdf", robot_text("panda.urdf")), &options)
+        .expect("a robot of the project");
     let loaded = robot.function(function.name()).expect("the function");
     let inputs: Vec<_> = numbers.iter().map(|x| (*x, BatchLayout::states_of(JOINTS))).collect();
     let mut found = vec![0.0; BATCH * JOINTS];
@@ -76,13 +57,12 @@ fn body(name: &str, lists: &[ArrayRef]) -> Result<f64> {
     let udf = udf.expect("a function");
     let fields: Vec<Arc<Field>> =
         (0..lists.len()).map(|k| Arc::new(Field::new(format!("x{k}"), lists[k].data_type().clone(), true))).collect();
-    let schema = datafusion::arrow::datatypes::Schema::new(fields);
+    let schema = Schema::new(fields);
     let columns = (0..lists.len()).map(|k| col(format!("x{k}")));
     let call = udf.call(std::iter::once(lit("panda.urdf")).chain(columns).collect());
     // as planning leaves it, with the text of the robot
     let context = SessionContext::new();
-    let table =
-        context.read_batch(datafusion::arrow::array::RecordBatch::try_new(Arc::new(schema), lists.to_vec())?)?;
+    let table = context.read_batch(RecordBatch::try_new(Arc::new(schema), lists.to_vec())?)?;
     let plan = context.state().optimize(table.select([call])?.logical_plan())?;
     let mut literal = None;
     plan.expressions().into_iter().for_each(|expr| {
@@ -106,7 +86,9 @@ fn body(name: &str, lists: &[ArrayRef]) -> Result<f64> {
 
 fn main() -> Result<()> {
     println!("| function | plain loop, states/s | function, states/s | ratio |\n|---|---|---|---|");
-    let lists = lists();
+    let table = log_at(1000.0, JOINTS, 0..BATCH).table();
+    // q, q̇ and q̈
+    let lists = [1, 2, 3].map(|k| table.column(k).clone());
     let numbers = lists.each_ref().map(|list| list.as_list::<i32>().values().as_primitive::<Float64Type>().values());
     let numbers = numbers.each_ref().map(|values| &values[..]);
     for (name, function, inputs) in [

@@ -1,16 +1,17 @@
 //! Rows of a cluster are those of one process, also when executors are lost.
 
-use crate::processes::cluster;
-use datafusion::arrow::array::{ArrayRef, AsArray, Float64Builder, ListBuilder, RecordBatch, UInt32Array};
+use datafusion::arrow::array::{AsArray, RecordBatch};
 use datafusion::arrow::compute::concat_batches;
-use datafusion::arrow::datatypes::{Field, Float64Type, Schema, UInt32Type};
-use datafusion::parquet::arrow::ArrowWriter;
-use datafusion::prelude::{ParquetReadOptions, SessionConfig, SessionContext};
+use datafusion::arrow::datatypes::UInt32Type;
+use datafusion::prelude::{SessionConfig, SessionContext};
 use futures::StreamExt;
 use std::path::{Path, PathBuf};
-use std::sync::Arc;
 use std::time::Duration;
 use straightline_cluster::register;
+use straightline_fleet_testing::log::{log_at, write};
+use straightline_fleet_testing::processes::{cluster, executor};
+use straightline_fleet_testing::project;
+use straightline_fleet_testing::query::{collected, read_logs, runtime};
 use straightline_fleets::RobotFolder;
 
 /// Files of a log, which are as many partitions.
@@ -18,58 +19,20 @@ const FILES: usize = 6;
 /// A query ends within this time, or fails: then something hangs.
 const LONGEST: Duration = Duration::from_secs(240);
 
-/// Robots and experiments of the project.
-fn project() -> PathBuf {
-    PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("../../robots")
-}
-
-/// Writes a file of a log of the UR5.
-fn write_log(path: &Path, first: u32, rows: u32) {
-    let four = |x: f64| (x * 1e4).round() / 1e4;
-    let mut lists = [0, 1, 2, 3].map(|_| ListBuilder::new(Float64Builder::new()));
-    for row in first..first + rows {
-        let t = f64::from(row) / 100.0;
-        let joint = |k: usize| {
-            let w = 0.9 + 0.4 * k as f64;
-            [0.7 * (w * t).sin(), 0.7 * w * (w * t).cos(), -0.7 * w * w * (w * t).sin(), 30.0 * (w * t).cos()].map(four)
-        };
-        let joints: Vec<[f64; 4]> = (0..6).map(joint).collect();
-        for (k, list) in lists.iter_mut().enumerate() {
-            list.append_value(joints.iter().map(|joint| Some(joint[k])));
-        }
-    }
-    let mut columns: Vec<ArrayRef> = vec![Arc::new(UInt32Array::from_iter_values(first..first + rows))];
-    columns.extend(lists.iter_mut().map(|list| Arc::new(list.finish()) as ArrayRef));
-    let names = ["id", "q", "qd", "qdd", "effort"];
-    let fields: Vec<Field> =
-        names.iter().zip(&columns).map(|(name, column)| Field::new(*name, column.data_type().clone(), true)).collect();
-    let table = RecordBatch::try_new(Arc::new(Schema::new(fields)), columns).unwrap();
-    let mut writer = ArrowWriter::try_new(std::fs::File::create(path).unwrap(), table.schema(), None).unwrap();
-    writer.write(&table).unwrap();
-    writer.close().unwrap();
-}
-
-fn write_logs(folder: &Path, rows: u32) -> PathBuf {
+/// Writes a log of the UR5.
+fn write_logs(folder: &Path, rows: usize) -> PathBuf {
     let logs = folder.join("logs");
     std::fs::create_dir(&logs).unwrap();
-    for k in 0..FILES as u32 {
-        write_log(&logs.join(format!("hour{k}.parquet")), k * rows, rows);
+    for k in 0..FILES {
+        write(&logs.join(format!("hour{k}.parquet")), [log_at(100.0, 6, k * rows..(k + 1) * rows).table()]);
     }
     logs
 }
 
-fn runtime() -> tokio::runtime::Runtime {
-    tokio::runtime::Builder::new_multi_thread().worker_threads(2).enable_all().build().expect("threads")
-}
-
 async fn run(context: &SessionContext, logs: &Path, sql: &str) -> datafusion::error::Result<RecordBatch> {
     register(context, &RobotFolder::at(project()));
-    let table = context.read_parquet(logs.to_str().expect("a path of text"), ParquetReadOptions::default()).await?;
-    context.deregister_table("logs")?;
-    context.register_table("logs", table.into_view())?;
-    let batches = context.sql(sql).await?.collect().await?;
-    let schema = batches.first().expect("rows").schema();
-    Ok(concat_batches(&schema, &batches)?)
+    read_logs(context, logs).await?;
+    collected(context, sql).await
 }
 
 fn config() -> SessionConfig {
@@ -98,10 +61,8 @@ fn distributed(url: &str, logs: &Path, sql: &str, meanwhile: impl FnOnce() + Sen
 
 /// Bits of the rows, by their keys.
 fn bits(table: &RecordBatch) -> Vec<(u32, Vec<u64>)> {
-    let (keys, found) = (table.column(0).as_primitive::<UInt32Type>(), table.column(1).as_struct());
-    let of =
-        |row: usize| found.columns().iter().map(|c| c.as_primitive::<Float64Type>().value(row).to_bits()).collect();
-    (0..table.num_rows()).map(|row| (keys.value(row), of(row))).collect()
+    let keys = table.column(0).as_primitive::<UInt32Type>().values().to_vec();
+    keys.into_iter().zip(straightline_fleet_testing::query::bits(table, "r")).collect()
 }
 
 const RESIDUALS: &str = "SELECT id, residual('descriptions/ur5.urdf', q, qd, qdd, effort) AS r FROM logs ORDER BY id";
@@ -198,8 +159,7 @@ fn an_executor_that_is_killed_while_it_serves_results_changes_no_row() {
     let found: datafusion::error::Result<RecordBatch> = runtime().block_on(async {
         let context = straightline_cluster::session(&cluster.url, config()).await?;
         register(&context, &RobotFolder::at(project()));
-        let table = context.read_parquet(logs.to_str().expect("a path of text"), ParquetReadOptions::default()).await?;
-        context.register_table("logs", table.into_view())?;
+        read_logs(&context, &logs).await?;
         let mut rows = context.sql(sql).await?.execute_stream().await?;
         let mut batches = vec![rows.next().await.expect("rows")?];
         lost.kill();
@@ -232,7 +192,7 @@ fn a_query_whose_executors_are_all_killed_says_so_and_the_next_has_its_rows() {
     });
     println!("ended after {:?}: {}", start.elapsed(), found.is_ok());
     rows_or_reason(found, &wanted);
-    let again = crate::processes::executor(cluster.port, 1, &folder.path().join("executor2"));
+    let again = executor(cluster.port, 1, &folder.path().join("executor2"));
     assert!(bits(&distributed(&url, &logs, RESIDUALS, || ()).unwrap()) == wanted);
     drop(again);
 }

@@ -1,4 +1,3 @@
 //! Tests of the cluster, in one binary.
 
 mod cluster;
-mod processes;

@@ -1,6 +1,6 @@
 //! Normal equations: the same bits in any order, close to a plain sum, and the robot's own parameters come out.
 
-use crate::helpers::{lists, log, plain, robot_text, rows, session, Log};
+use crate::helpers::{plain, session};
 use datafusion::arrow::array::{Array, AsArray, RecordBatch};
 use datafusion::arrow::datatypes::{Float64Type, UInt64Type};
 use straightline_codegen::choices::OptimisationTier;
@@ -8,6 +8,9 @@ use straightline_codegen::diagnostic::Source;
 use straightline_codegen::options::Options;
 use straightline_codegen::Function;
 use straightline_core::base_parameters::JointParameter;
+use straightline_fleet_testing::log::{log, Log};
+use straightline_fleet_testing::query::rows;
+use straightline_fleet_testing::robot_text;
 use straightline_jit::{BatchLayout, Robot};
 
 const SQL: &str = "SELECT regressor_normal_equations('ur5.urdf', q, qd, qdd, effort) AS n FROM logs";
@@ -35,7 +38,7 @@ fn bits(table: &RecordBatch) -> Vec<u64> {
 
 #[test]
 fn sums_have_the_same_bits_for_any_partitions_and_any_order() {
-    let table = of_the_robot("ur5.urdf", 6, 1501).batch(&lists());
+    let table = of_the_robot("ur5.urdf", 6, 1501).table();
     let wanted = bits(&rows(&session(&table, 1, 8192), SQL).unwrap());
     for (partitions, batch) in [(1, 1), (2, 100), (7, 100), (7, 8192)] {
         let found = rows(&session(&table, partitions, batch), SQL).unwrap();
@@ -49,7 +52,7 @@ fn sums_have_the_same_bits_for_any_partitions_and_any_order() {
 #[test]
 fn sums_are_those_of_a_plain_loop_but_for_its_rounding() {
     let log = of_the_robot("ur5.urdf", 6, 400);
-    let found = rows(&session(&log.batch(&lists()), 3, 64), SQL).unwrap();
+    let found = rows(&session(&log.table(), 3, 64), SQL).unwrap();
     let mut options =
         Options { functions: vec![Function::TorqueRegressor], optimise: OptimisationTier::Quick, ..Options::default() };
     options.scene.regressor = vec![JointParameter::Damping, JointParameter::Coulomb, JointParameter::Offset];
@@ -99,7 +102,7 @@ fn the_robots_own_base_parameters_come_out() {
         let sql = format!(
             "SELECT identified_parameters(regressor_normal_equations('{robot}', q, qd, qdd, effort)) AS p FROM logs"
         );
-        let found = parameters(&rows(&session(&log.batch(&lists()), 2, 1000), &sql).unwrap());
+        let found = parameters(&rows(&session(&log.table(), 2, 1000), &sql).unwrap());
         let greatest = found.iter().fold(0.0, |most: f64, (_, nominal, ..)| most.max(nominal.abs()));
         let mut told = 0;
         let mut worst: f64 = 0.0;
@@ -116,7 +119,7 @@ fn the_robots_own_base_parameters_come_out() {
 
 #[test]
 fn a_fleet_is_identified_by_one_query() {
-    let table = of_the_robot("ur5.urdf", 6, 3000).batch(&lists());
+    let table = of_the_robot("ur5.urdf", 6, 3000).table();
     let sql = "SELECT id % 3 AS robot, regressor_normal_equations('ur5.urdf', q, qd, qdd, effort) AS n FROM logs GROUP BY id % 3 ORDER BY robot";
     let found = rows(&session(&table, 2, 100), sql).unwrap();
     let counts = found.column(1).as_struct().column(0).as_primitive::<UInt64Type>().values().to_vec();
@@ -134,7 +137,7 @@ fn what_a_log_does_not_tell_has_no_value() {
     log.columns[3] = plain("planar2r.urdf", Function::InverseDynamics, &[q, qd, qdd]).concat();
     let sql =
         "SELECT identified_parameters(regressor_normal_equations('planar2r.urdf', q, qd, qdd, effort)) AS p FROM logs";
-    let found = parameters(&rows(&session(&log.batch(&lists()), 1, 100), sql).unwrap());
+    let found = parameters(&rows(&session(&log.table(), 1, 100), sql).unwrap());
     let untold: Vec<&str> =
         found.iter().filter(|(.., value, _)| value.is_none()).map(|(name, ..)| name.as_str()).collect();
     // friction of a joint at rest
@@ -144,7 +147,7 @@ fn what_a_log_does_not_tell_has_no_value() {
 
 #[test]
 fn rows_that_no_sum_holds_are_told() {
-    let table = log(6, 4).batch(&lists());
+    let table = log(6, 4).table();
     let sql = "SELECT regressor_normal_equations('ur5.urdf', q, qd, qdd, make_array(1, 2, 3, 'NaN'::double, 5, 6)) AS n FROM logs";
     let said = rows(&session(&table, 1, 8192), sql).unwrap_err();
     let wanted = "a product of regressor and efforts is NaN, which exact sums do not hold\n\

@@ -1,12 +1,14 @@
 //! Lists of every kind, nulls, and lists of another length.
 
-use crate::helpers::{bits, lists, log, plain, rows, session, to_bits, Log};
+use crate::helpers::{plain, session, to_bits};
 use datafusion::arrow::array::{Array, ArrayRef, AsArray, Int32Array, ListArray, RecordBatch, StructArray};
 use datafusion::arrow::buffer::{NullBuffer, OffsetBuffer};
 use datafusion::arrow::compute::{cast, take_record_batch};
 use datafusion::arrow::datatypes::{DataType, Field, Float64Type, Schema};
 use std::sync::Arc;
 use straightline_codegen::Function;
+use straightline_fleet_testing::log::{lists, log, Log};
+use straightline_fleet_testing::query::{bits, rows};
 
 const SQL: &str = "SELECT id, inverse_dynamics('panda.urdf', q, qd, qdd) AS tau FROM logs ORDER BY id";
 
@@ -36,7 +38,8 @@ fn lists_of_every_kind_are_taken() {
 fn single_precision_is_widened_and_integers_are_taken() {
     let narrow = |x: f64| f64::from(x as f32);
     let log = log(7, 100);
-    let narrowed = Log { joints: 7, columns: log.columns.clone().map(|c| c.into_iter().map(narrow).collect()) };
+    let narrowed =
+        Log { joints: 7, first: 0, columns: log.columns.clone().map(|c| c.into_iter().map(narrow).collect()) };
     for kind in [DataType::Float32, DataType::Float16] {
         let kept: DataType = DataType::new_list(kind.clone(), true);
         let wanted = match kind {
@@ -47,12 +50,13 @@ fn single_precision_is_widened_and_integers_are_taken() {
                     let wide = cast(table.column_by_name(name).unwrap(), &lists()).unwrap();
                     wide.as_list::<i32>().values().as_primitive::<Float64Type>().values().to_vec()
                 };
-                torques(&Log { joints: 7, columns: [wide("q"), wide("qd"), wide("qdd"), Vec::new()] })
+                torques(&Log { joints: 7, first: 0, columns: [wide("q"), wide("qd"), wide("qdd"), Vec::new()] })
             }
         };
         assert_eq!(bits(&rows(&session(&log.batch(&kept), 1, 64), SQL).unwrap(), "tau"), wanted, "{kind}");
     }
-    let whole = Log { joints: 7, columns: log.columns.clone().map(|c| c.into_iter().map(f64::round).collect()) };
+    let whole =
+        Log { joints: 7, first: 0, columns: log.columns.clone().map(|c| c.into_iter().map(f64::round).collect()) };
     let table = whole.batch(&DataType::new_list(DataType::Int64, true));
     assert_eq!(bits(&rows(&session(&table, 1, 64), SQL).unwrap(), "tau"), torques(&whole));
 }
@@ -62,7 +66,7 @@ fn columns_per_joint_are_taken_as_a_list_or_as_a_struct() {
     let log = log(2, 50);
     let [q, qd, qdd, _] = log.columns.each_ref().map(|column| &column[..]);
     let wanted = to_bits(&plain("planar2r.urdf", Function::InverseDynamics, &[q, qd, qdd]));
-    let context = session(&log.batch(&lists()), 1, 8192);
+    let context = session(&log.table(), 1, 8192);
     for q in ["make_array(q[1], q[2])", "named_struct('joint1', q[1], 'joint2', q[2])"] {
         let sql = format!("SELECT id, inverse_dynamics('planar2r.urdf', {q}, qd, qdd) AS tau FROM logs ORDER BY id");
         assert_eq!(bits(&rows(&context, &sql).unwrap(), "tau"), wanted, "{q}");
@@ -78,7 +82,7 @@ fn columns_per_joint_are_taken_as_a_list_or_as_a_struct() {
 
 /// The log with null lists, null numbers in lists, and null lists that hide numbers.
 fn with_nulls(log: &Log) -> RecordBatch {
-    let table = log.batch(&lists());
+    let table = log.table();
     let rows = table.num_rows();
     let is_there = |row: usize| !row.is_multiple_of(5);
     let with = |column: &ArrayRef, nulls: NullBuffer| -> ArrayRef {
@@ -118,14 +122,14 @@ fn a_row_without_a_state_has_no_result_and_the_others_keep_their_bits() {
             assert!(is_null || *own == wanted[row], "row {row}");
         }
     }
-    let context = session(&log.batch(&lists()), 1, 8192);
+    let context = session(&log.table(), 1, 8192);
     let found = rows(&context, "SELECT inverse_dynamics('panda.urdf', NULL, qd, qdd) AS tau FROM logs").unwrap();
     assert_eq!(found.column(0).null_count(), 231);
 }
 
 #[test]
 fn a_list_of_another_length_is_told_with_its_row() {
-    let context = session(&log(7, 10).batch(&lists()), 1, 8192);
+    let context = session(&log(7, 10).table(), 1, 8192);
     let sql = "SELECT inverse_dynamics('panda.urdf', CASE WHEN id = 4 THEN array_slice(q, 1, 6) ELSE q END, qd, qdd) FROM logs";
     assert_eq!(
         rows(&context, sql).unwrap_err(),

@@ -1,9 +1,12 @@
 //! Many robots in one query.
 
-use crate::helpers::{lists, log, robot_text, rows, session};
+use crate::helpers::session;
 use datafusion::arrow::array::AsArray;
 use datafusion::arrow::datatypes::Float64Type;
 use std::time::Instant;
+use straightline_fleet_testing::log::log;
+use straightline_fleet_testing::query::rows;
+use straightline_fleet_testing::robot_text;
 use straightline_fleets::{programs_kept, register, RobotFolder};
 
 /// Pages of this process that are in memory, in MB; none where the system does not say so.
@@ -24,7 +27,7 @@ fn a_thousand_robots_are_in_one_query() {
         assert_ne!(own, text);
         std::fs::write(folder.path().join(format!("panda{k:04}.urdf")), own).unwrap();
     }
-    let context = session(&log(7, 2000).batch(&lists()), 2, 1000);
+    let context = session(&log(7, 2000).table(), 2, 1000);
     register(&context, &RobotFolder::at(folder.path()));
     let torque = |k: usize| format!("gravity_force('panda{k:04}.urdf', q)['panda_joint4'] AS g{k}");
     let sql = format!("SELECT {} FROM logs WHERE id < 10", (0..1000).map(torque).collect::<Vec<_>>().join(", "));

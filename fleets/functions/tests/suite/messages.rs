@@ -1,25 +1,21 @@
 //! What is wrong with a query, a robot or its file is said while planning, whole.
 
-use crate::helpers::{lists, log, robot_text, robots, session};
+use crate::helpers::session;
+use datafusion::arrow::datatypes::DataType;
 use datafusion::prelude::SessionContext;
+use straightline_fleet_testing::log::log;
+use straightline_fleet_testing::query::runtime;
+use straightline_fleet_testing::{robot_text, robots};
 use straightline_fleets::{register, written_hash, RobotFolder};
 
 /// What planning says, without a row being computed.
 fn planned(context: &SessionContext, sql: &str) -> Result<(), String> {
     let plan = async { context.sql(sql).await?.create_physical_plan().await };
-    let runtime = tokio::runtime::Builder::new_current_thread().build().expect("a thread");
-    runtime.block_on(plan).map(drop).map_err(|wrong| wrong.to_string())
+    runtime().block_on(plan).map(drop).map_err(|wrong| wrong.to_string())
 }
 
 fn complaint(sql: &str) -> String {
-    let kind = datafusion::arrow::datatypes::DataType::FixedSizeList(
-        std::sync::Arc::new(datafusion::arrow::datatypes::Field::new(
-            "item",
-            datafusion::arrow::datatypes::DataType::Float64,
-            true,
-        )),
-        7,
-    );
+    let kind = DataType::new_fixed_size_list(DataType::Float64, 7, true);
     planned(&session(&log(7, 3).batch(&kind), 1, 8192), sql).unwrap_err()
 }
 
@@ -32,7 +28,7 @@ fn a_broken_file_is_refused_with_line_and_caret() {
     std::fs::write(folder.path().join("arm.urdf"), &broken).unwrap();
     let line = broken.lines().position(|line| line.contains("1.5 kg")).unwrap() + 1;
     for call in ["gravity_force('arm.urdf', q)", "regressor_normal_equations('arm.urdf', q, qd, qdd, effort)"] {
-        let context = session(&log(2, 3).batch(&lists()), 1, 8192);
+        let context = session(&log(2, 3).table(), 1, 8192);
         register(&context, &RobotFolder::at(folder.path()));
         let said = planned(&context, &format!("SELECT {call} FROM logs")).unwrap_err();
         let pad = " ".repeat(line.to_string().len());
@@ -46,7 +42,7 @@ fn a_broken_file_is_refused_with_line_and_caret() {
 #[test]
 fn a_hash_says_which_file_is_meant() {
     let hash = written_hash(robot_text("panda.urdf").as_bytes());
-    let context = session(&log(7, 3).batch(&lists()), 1, 8192);
+    let context = session(&log(7, 3).table(), 1, 8192);
     planned(&context, &format!("SELECT gravity_force('panda.urdf#{hash}', q) FROM logs")).unwrap();
     planned(
         &context,
@@ -69,7 +65,7 @@ fn a_hash_says_which_file_is_meant() {
 fn a_file_that_changes_is_read_again() {
     let folder = tempfile::tempdir().unwrap();
     let file = folder.path().join("arm.urdf");
-    let context = session(&log(2, 3).batch(&lists()), 1, 8192);
+    let context = session(&log(2, 3).table(), 1, 8192);
     register(&context, &RobotFolder::at(folder.path()));
     std::fs::write(&file, "<robot/>").unwrap();
     assert!(planned(&context, "SELECT gravity_force('arm.urdf', q) FROM logs").is_err());
@@ -132,7 +128,7 @@ fn a_robot_that_efforts_of_joints_do_not_tell_is_refused() {
     let folder = tempfile::tempdir().unwrap();
     let text = robot_text("planar2r.urdf").replacen("type=\"revolute\"", "type=\"floating\"", 1);
     std::fs::write(folder.path().join("free.urdf"), text).unwrap();
-    let context = session(&log(2, 3).batch(&lists()), 1, 8192);
+    let context = session(&log(2, 3).table(), 1, 8192);
     register(&context, &RobotFolder::at(folder.path()));
     let said =
         planned(&context, "SELECT regressor_normal_equations('free.urdf', q, qd, qdd, effort) FROM logs").unwrap_err();
@@ -145,7 +141,7 @@ fn a_robot_that_takes_other_files_is_refused() {
     let links = "<mujoco><worldbody><body><joint name=\"hinge\" axis=\"0 1 0\"/><geom type=\"sphere\" size=\"0.1\" pos=\"0 0 0.3\" mass=\"2\"/></body></worldbody></mujoco>";
     std::fs::write(folder.path().join("links.xml"), links).unwrap();
     std::fs::write(folder.path().join("arm.xml"), "<mujoco><include file=\"links.xml\"/></mujoco>").unwrap();
-    let context = session(&log(1, 3).batch(&lists()), 1, 8192);
+    let context = session(&log(1, 3).table(), 1, 8192);
     register(&context, &RobotFolder::at(folder.path()));
     planned(&context, "SELECT gravity_force('links.xml', q) FROM logs").unwrap();
     let said = planned(&context, "SELECT gravity_force('arm.xml', q) FROM logs").unwrap_err();

@@ -1,8 +1,10 @@
 //! Rows have the bits of the plain loop over states.
 
-use crate::helpers::{bits, lists, log, plain, plain_by, rows, session, to_bits};
+use crate::helpers::{plain, plain_by, session, to_bits};
 use datafusion::arrow::array::{AsArray, Float64Array};
 use straightline_codegen::Function;
+use straightline_fleet_testing::log::log;
+use straightline_fleet_testing::query::{bits, rows};
 use straightline_fleets::{register, RobotFolder};
 use straightline_jit::ExecutionMode;
 
@@ -14,7 +16,7 @@ fn bits_are_those_of_the_plain_loop_for_any_partitions_and_batches() {
     let accelerations = plain("panda.urdf", Function::ForwardDynamics, &[q, qd, effort]);
     let left = |(row, model): (&[f64], &Vec<f64>)| row.iter().zip(model).map(|(x, y)| x - y).collect::<Vec<f64>>();
     let residuals: Vec<Vec<f64>> = effort.chunks(7).zip(&torques).map(left).collect();
-    let table = log.batch(&lists());
+    let table = log.table();
     let sql = "SELECT id, inverse_dynamics('panda.urdf', q, qd, qdd) AS tau, residual('panda.urdf', q, qd, qdd, effort) AS r, \
                forward_dynamics('panda.urdf', q, qd, effort) AS a FROM logs ORDER BY id";
     for partitions in [1, 2, 7] {
@@ -36,7 +38,7 @@ fn bits_are_those_of_every_set_of_instructions() {
     let log = log(7, 1003);
     let [q, qd, qdd, _] = log.columns.each_ref().map(|column| &column[..]);
     let sql = "SELECT id, inverse_dynamics('panda.urdf', q, qd, qdd) AS tau FROM logs ORDER BY id";
-    let found = bits(&rows(&session(&log.batch(&lists()), 2, 100), sql).unwrap(), "tau");
+    let found = bits(&rows(&session(&log.table(), 2, 100), sql).unwrap(), "tau");
     // what the machine lacks is interpreted
     for by in ExecutionMode::ALL {
         let wanted = plain_by(by, "panda.urdf", Function::InverseDynamics, &[q, qd, qdd]);
@@ -46,7 +48,7 @@ fn bits_are_those_of_every_set_of_instructions() {
 
 #[test]
 fn results_are_structs_of_the_joints() {
-    let context = session(&log(6, 3).batch(&lists()), 1, 8192);
+    let context = session(&log(6, 3).table(), 1, 8192);
     let sql = "SELECT gravity_force('ur5.urdf', q)['elbow_joint'] AS elbow, bias_force('ur5.urdf', q, qd) AS h FROM logs ORDER BY id";
     let found = rows(&context, sql).unwrap();
     let states = log(6, 3);
@@ -68,7 +70,7 @@ fn a_joint_of_several_coordinates_has_them_by_number() {
                 <body name=\"wheel\" pos=\"0 0 0.1\"><joint name=\"axle\" axis=\"0 0 1\"/><geom type=\"cylinder\" size=\"0.05 0.01\" mass=\"0.2\"/></body>\
                 </body></worldbody></mujoco>";
     std::fs::write(folder.path().join("drone.xml"), text).unwrap();
-    let context = session(&log(2, 1).batch(&lists()), 1, 8192);
+    let context = session(&log(2, 1).table(), 1, 8192);
     register(&context, &RobotFolder::at(folder.path()));
     let sql = "SELECT gravity_force('drone.xml', make_array(0, 0, 1.2, 0, 0, 0, 1, 0.3)) AS g";
     let found = rows(&context, sql).unwrap();
@@ -83,7 +85,7 @@ fn a_joint_of_several_coordinates_has_them_by_number() {
 
 #[test]
 fn efforts_beyond_the_limits_of_the_file_are_named() {
-    let context = session(&log(7, 1).batch(&lists()), 1, 8192);
+    let context = session(&log(7, 1).table(), 1, 8192);
     let sql = "SELECT torque_limits_exceeded('panda.urdf', make_array(1000.0, -1000.1, 0, 0, 2e3, 0, 12)) AS joints";
     let found = rows(&context, sql).unwrap();
     let text = datafusion::arrow::util::pretty::pretty_format_batches(&[found]).unwrap().to_string();

@@ -1,46 +1,25 @@
 //! The command as people call it, over Parquet files.
 
-use datafusion::arrow::array::{ArrayRef, Float64Builder, ListBuilder, RecordBatch, StringArray, UInt32Array};
-use datafusion::arrow::datatypes::{Field, Schema};
-use datafusion::parquet::arrow::ArrowWriter;
-use std::path::{Path, PathBuf};
+use datafusion::arrow::array::{ArrayRef, RecordBatch, StringArray};
+use std::path::Path;
 use std::process::{Command, Output};
 use std::sync::Arc;
+use straightline_fleet_testing::log::{log, write};
+use straightline_fleet_testing::robots;
 
-fn robots() -> PathBuf {
-    PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("../../robots/descriptions")
-}
-
-/// Writes a log of the planar arm: its joints swing, and its drives give what the file's masses ask for at rest.
+/// Writes a log of the planar arm, of a robot of that name.
 fn write_log(path: &Path, robot: &str, rows: usize) {
-    let four = |x: f64| (x * 1e4).round() / 1e4;
-    let mut lists = [0, 1, 2, 3].map(|_| ListBuilder::new(Float64Builder::new()));
-    for row in 0..rows {
-        let t = row as f64 / 100.0;
-        let joint = |k: usize| {
-            let w = 1.1 + 0.6 * k as f64;
-            [0.7 * (w * t).sin(), 0.7 * w * (w * t).cos(), -0.7 * w * w * (w * t).sin(), 3.5 * (w * t).cos()].map(four)
-        };
-        for (k, list) in lists.iter_mut().enumerate() {
-            list.append_value([Some(joint(0)[k]), Some(joint(1)[k])]);
-        }
-    }
-    let mut columns: Vec<ArrayRef> =
-        vec![Arc::new(StringArray::from(vec![robot; rows])), Arc::new(UInt32Array::from_iter_values(0..rows as u32))];
-    columns.extend(lists.iter_mut().map(|list| Arc::new(list.finish()) as ArrayRef));
-    let names = ["robot", "id", "q", "qd", "qdd", "effort"];
-    let fields: Vec<Field> =
-        names.iter().zip(&columns).map(|(name, column)| Field::new(*name, column.data_type().clone(), true)).collect();
-    let table = RecordBatch::try_new(Arc::new(Schema::new(fields)), columns).unwrap();
-    let mut writer = ArrowWriter::try_new(std::fs::File::create(path).unwrap(), table.schema(), None).unwrap();
-    writer.write(&table).unwrap();
-    writer.close().unwrap();
+    let table = log(2, rows).table();
+    let names: ArrayRef = Arc::new(StringArray::from(vec![robot; rows]));
+    let columns = std::iter::once(("robot", names));
+    let schema = table.schema();
+    let others = schema.fields().iter().map(|field| field.name().as_str()).zip(table.columns().iter().cloned());
+    write(path, [RecordBatch::try_from_iter(columns.chain(others)).expect("columns of one length")]);
 }
 
 fn run(folder: &Path, arguments: &[&str]) -> Output {
-    let robots = robots();
     let mut command = Command::new(env!("CARGO_BIN_EXE_straightline-query"));
-    command.current_dir(folder).arg("--robots").arg(robots).args(arguments);
+    command.current_dir(folder).arg("--robots").arg(robots()).args(arguments);
     command.output().expect("the command runs")
 }
 
@@ -144,21 +123,17 @@ fn what_is_wrong_is_said_once_without_the_names_of_rules() {
 /// A scheduler and an executor in threads of the test: where they listen.
 #[cfg(feature = "cluster")]
 fn cluster(folder: &Path) -> String {
-    use std::net::{TcpListener, TcpStream};
-    use std::time::{Duration, Instant};
+    use std::future::Future;
+    use std::pin::Pin;
+    use std::time::Duration;
     use straightline_cluster::{execute, schedule, ExecutorSettings, SchedulerSettings};
+    use straightline_fleet_testing::processes::{free_port, wait_for};
+    use straightline_fleet_testing::query::runtime;
 
-    let free = || TcpListener::bind("127.0.0.1:0").and_then(|socket| socket.local_addr()).expect("a free port").port();
-    let [port, results, tasks] = [free(), free(), free()];
-    let in_thread = |work: std::pin::Pin<Box<dyn std::future::Future<Output = ()> + Send>>, port: u16| {
-        let runtime =
-            tokio::runtime::Builder::new_multi_thread().worker_threads(2).enable_all().build().expect("threads");
-        std::thread::spawn(move || runtime.block_on(work));
-        let start = Instant::now();
-        while TcpStream::connect(("127.0.0.1", port)).is_err() {
-            assert!(start.elapsed() < Duration::from_secs(60), "nobody listens at port {port}");
-            std::thread::sleep(Duration::from_millis(20));
-        }
+    let [port, results, tasks] = [free_port(), free_port(), free_port()];
+    let in_thread = |work: Pin<Box<dyn Future<Output = ()> + Send>>, port: u16| {
+        std::thread::spawn(move || runtime().block_on(work));
+        wait_for(port);
     };
     let settings = SchedulerSettings { address: ([127, 0, 0, 1], port).into(), patience: Duration::from_secs(60) };
     in_thread(Box::pin(async move { schedule(&settings).await.expect("a scheduler") }), port);
