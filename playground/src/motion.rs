@@ -45,20 +45,6 @@ fn swing(joint: &Joint, k: usize) -> JointSwing<'_> {
     JointSwing { joint, middle, amplitude, phase: BEHIND * k as f64 }
 }
 
-/// Coordinates at which joints do nothing.
-pub fn neutral(model: &Model<f64>) -> Vec<f64> {
-    if !model.closure.is_empty() {
-        return model.closure.home.clone();
-    }
-    let mut q = vec![0.0; model.nq()];
-    for joint in model.free_joints() {
-        for (q, neutral) in q[joint.iq..].iter_mut().zip(joint.kind.row().neutral) {
-            *q = neutral.max(joint.limits.lower).min(joint.limits.upper);
-        }
-    }
-    q
-}
-
 /// A period of so many seconds, its end included, for a page of so many columns. Robots with closed loops stand still, as joints with several
 /// coordinates do.
 pub fn rows(model: &Model<f64>, period: f64, columns: usize) -> SwingRows {
@@ -70,7 +56,7 @@ pub fn rows(model: &Model<f64>, period: f64, columns: usize) -> SwingRows {
     };
     let characters = (4 * (7 * model.bodies.len() + columns) + 8) * 4 / 3;
     let count = (MOST_CHARACTERS / characters).clamp(ROWS[0], ROWS[1] + 1);
-    let start = neutral(model);
+    let start = model.neutral();
     let rate = std::f64::consts::TAU / period;
     let mut rows = SwingRows::default();
     for row in 0..count {

@@ -13,7 +13,6 @@ use crate::plant::{Action, Plant};
 use crate::table::DataTable;
 use std::ops::ControlFlow;
 use straightline_core::algorithms::{kinetic_energy, DrivenMotion};
-use straightline_core::joint::Descriptor;
 use straightline_core::model::Limits;
 
 /// Times that are no further apart, as a part of the duration, are the same up to rounding.
@@ -316,21 +315,18 @@ const ENERGY_COLUMNS: [&str; DriveEnergies::COUNT] =
 
 pub(crate) fn names(plant: &Plant, command: &Command) -> Vec<String> {
     let joints = plant.model.joints();
-    let named = |prefix: &str, entries: fn(&Descriptor) -> &'static [&'static str]| -> Vec<String> {
-        let of = |joint: &&straightline_core::model::Joint| match joint.kind.is_single() {
-            true => vec![format!("{prefix}.{}", joint.name)],
-            false => entries(joint.kind.row()).iter().map(|c| format!("{prefix}.{}.{c}", joint.name)).collect(),
-        };
+    let named = |prefix: &str, order: usize| -> Vec<String> {
         // what loops determine has no velocity of its own
-        let own = joints.iter().filter(|joint| prefix == "q" || joint.iv < plant.model.nv());
-        own.flat_map(of).collect()
+        let own = joints.iter().filter(|joint| order == 0 || joint.iv < plant.model.nv());
+        own.flat_map(|joint| joint.entry_names(order)).map(|name| format!("{prefix}.{name}")).collect()
     };
     let mut names = vec!["t".to_string()];
-    names.extend(named("q", |row| row.entries[0]));
-    names.extend(named("qd", |row| row.entries[1]));
-    names.extend(named("tau", |row| row.entries[2]));
+    names.extend(named("q", 0));
+    names.extend(named("qd", 1));
+    names.extend(named("tau", 2));
     if matches!(command, Command::Controller(_)) {
-        names.extend(named("error", |_| &[]));
+        let controlled = joints.iter().filter(|joint| joint.kind.is_single() && joint.iv < plant.model.nv());
+        names.extend(controlled.map(|joint| format!("error.{}", joint.name)));
     }
     for prefix in if plant.is_driven() { &DRIVE_COLUMNS[..] } else { &[] } {
         names.extend(plant.model.drives.iter().map(|d| format!("{prefix}.{}", d.name)));
@@ -422,8 +418,13 @@ impl Watch for StateWatch<'_> {
     fn step(&mut self, step: &AcceptedStep) -> ControlFlow<()> {
         let AcceptedStep { t_before, t, y_before, y, within } = *step;
         let mut end = t;
-        let inside = |y: &[f64]| distance(self.plant, y) > 0.0;
-        let leaves = self.stops_at_limits && inside(y_before) && !inside(y);
+        // a joint that begins beyond its range does not leave it
+        let watched: Vec<bool> = distances(self.plant, y_before).map(|(distance, ..)| distance > 0.0).collect();
+        let inside = |y: &[f64]| {
+            let mut all = distances(self.plant, y).zip(&watched);
+            all.all(|((distance, ..), is_watched)| !is_watched || distance > 0.0)
+        };
+        let leaves = self.stops_at_limits && !inside(y);
         if leaves {
             // between steps by the method's own interpolation: bisection to the last bit of the time
             let (mut low, mut high) = (t_before, t);
@@ -468,7 +469,8 @@ fn distances<'a>(plant: &'a Plant, y: &'a [f64]) -> impl Iterator<Item = (f64, &
 }
 
 pub(crate) fn nearest_limit(plant: &Plant, time: f64, y: &[f64]) -> Stop {
-    let nearest = distances(plant, y).min_by(|a, b| a.0.total_cmp(&b.0));
+    // one that began far beyond is not the one that has just come to its end
+    let nearest = distances(plant, y).min_by(|a, b| a.0.abs().total_cmp(&b.0.abs()));
     let (_, joint, limit) = nearest.unwrap_or((0.0, "", 0.0));
     Stop { time, joint: joint.to_string(), limit }
 }

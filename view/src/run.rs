@@ -1,10 +1,6 @@
 //! What a page shows: configurations over time, and columns of numbers beside them.
 
-use straightline_core::joint::Descriptor;
 use straightline_core::model::{Joint, Model};
-
-/// Newton steps by which loops are closed where a run leaves out what they determine.
-const CLOSING_STEPS: usize = 20;
 
 /// Columns that a complaint names, at most.
 const MOST_NAMED: usize = 12;
@@ -40,16 +36,9 @@ impl std::fmt::Display for ViewFailure {
 
 impl std::error::Error for ViewFailure {}
 
-/// Names of a joint's entries behind a prefix: `q.elbow`, or `q.base.px`, …
-pub(crate) fn entry_names(
-    prefix: &str,
-    joint: &Joint,
-    entries: fn(&Descriptor) -> &'static [&'static str],
-) -> Vec<String> {
-    match joint.kind.is_single() {
-        true => vec![format!("{prefix}.{}", joint.name)],
-        false => entries(joint.kind.row()).iter().map(|entry| format!("{prefix}.{}.{entry}", joint.name)).collect(),
-    }
+/// Names of the columns of a joint's coordinates: `q.elbow`, or `q.base.x`, ….
+pub(crate) fn coordinate_columns(joint: &Joint) -> Vec<String> {
+    joint.entry_names(0).iter().map(|name| format!("q.{name}")).collect()
 }
 
 impl ViewedRun {
@@ -61,10 +50,10 @@ impl ViewedRun {
     pub fn of_columns(model: &Model<f64>, columns: &[(String, Vec<f64>)]) -> Result<ViewedRun, Vec<ViewFailure>> {
         let find = |name: &str| columns.iter().find(|(n, _)| n == name).map(|(_, column)| column);
         let Some(times) = find("t").cloned() else { return Err(vec![missing(&["t".to_string()], columns)]) };
-        let mut run = ViewedRun { configurations: vec![neutral(model); times.len()], times, ..Default::default() };
+        let mut run = ViewedRun { configurations: vec![model.neutral(); times.len()], times, ..Default::default() };
         let (mut solved, mut all_lacking) = (false, Vec::new());
         for joint in model.joints() {
-            let names = entry_names("q", joint, |row| row.entries[0]);
+            let names = coordinate_columns(joint);
             let given: Vec<_> = names.iter().map(|name| find(name)).collect();
             let alone = find(&joint.name).filter(|_| joint.kind.is_single() && given[0].is_none());
             let given: Vec<_> = given.into_iter().map(|column| column.or(alone)).collect();
@@ -118,9 +107,9 @@ impl ViewedRun {
 
     /// Solves for what loops determine, each row from the one before it.
     fn close(&mut self, model: &Model<f64>) -> Result<(), Vec<ViewFailure>> {
-        let mut before = neutral(model);
+        let mut before = model.neutral();
         for (t, q) in self.times.iter().zip(&mut self.configurations) {
-            let Some(closed) = closed(model, std::mem::take(q), &before) else {
+            let Some(closed) = model.closed_from(std::mem::take(q), &before) else {
                 let what = format!("at t = {t:?} s the loops of {} cannot be closed", model.name);
                 let help = "let the run have a column for every joint of the loops".to_string();
                 return Err(vec![ViewFailure { what, help }]);
@@ -169,18 +158,6 @@ impl ViewedRun {
     }
 }
 
-/// q with what loops determine, which is looked for from where it was `before`; `None` where loops do not close to what one can see.
-pub(crate) fn closed(model: &Model<f64>, mut q: Vec<f64>, before: &[f64]) -> Option<Vec<f64>> {
-    for joint in model.dependent_joints() {
-        let own = joint.iq..joint.iq + joint.kind.nq();
-        q[own.clone()].copy_from_slice(&before[own]);
-    }
-    let (q, _) = model.close_loops(&q, CLOSING_STEPS);
-    let y = model.tree_positions(&q);
-    let is_closed = model.closure.loops.iter().flat_map(|of| model.gap(of, &y)).all(|gap| gap.abs() < 1e-6);
-    is_closed.then_some(q)
-}
-
 fn missing(names: &[String], columns: &[(String, Vec<f64>)]) -> ViewFailure {
     let list = |names: &mut dyn ExactSizeIterator<Item = &String>| {
         let count = names.len();
@@ -193,18 +170,4 @@ fn missing(names: &[String], columns: &[(String, Vec<f64>)]) -> ViewFailure {
     let what = format!("there is no column {}", list(&mut names.iter()));
     let help = format!("the columns are {}", list(&mut columns.iter().map(|(name, _)| name)));
     ViewFailure { what, help }
-}
-
-/// Coordinates at which joints do nothing, or the nearest within their ranges; of a robot with loops those in which they were closed.
-pub(crate) fn neutral(model: &Model<f64>) -> Vec<f64> {
-    if !model.closure.is_empty() {
-        return model.closure.home.clone();
-    }
-    let mut q = vec![0.0; model.nq()];
-    for joint in model.free_joints() {
-        for (q, neutral) in q[joint.iq..].iter_mut().zip(joint.kind.row().neutral) {
-            *q = neutral.max(joint.limits.lower).min(joint.limits.upper);
-        }
-    }
-    q
 }

@@ -1,7 +1,7 @@
 //! What is shown of a robot without a run: each joint goes through its range, one after the other.
 
 use crate::html::most_rows;
-use crate::run::{closed, entry_names, neutral, ViewedRun};
+use crate::run::{coordinate_columns, ViewedRun};
 use crate::solids::reach;
 use straightline_core::algorithms::integrate;
 use straightline_core::joint::Measure;
@@ -23,7 +23,7 @@ impl ViewedRun {
     /// A motion through the range of each joint in turn: from where it stands to its upper limit, to its lower one, and back; without limits a
     /// quarter turn, or some of the robot's reach, to each side. Bases stand still. Robots with loops move as far as these stay closed.
     pub fn tour(model: &Model<f64>) -> ViewedRun {
-        let start = neutral(model);
+        let start = model.neutral();
         let mut run = ViewedRun { times: vec![0.0], configurations: vec![start.clone()], ..Default::default() };
         let size = reach(model, &start);
         let slide = SLIDE * size;
@@ -40,7 +40,7 @@ impl ViewedRun {
             }
         }
         let joints = model.joints();
-        let names = joints.iter().map(|joint| (joint.iq, entry_names("q", joint, |row| row.entries[0])));
+        let names = joints.iter().map(|joint| (joint.iq, coordinate_columns(joint)));
         for (first, names) in names {
             let column = |k: usize| run.configurations.iter().map(|q| q[first + k]).collect();
             run.columns.extend(names.into_iter().enumerate().map(|(k, name)| (name, column(k))));
@@ -91,5 +91,5 @@ fn configuration(model: &Model<f64>, start: &[f64], before: &[f64], step: &[f64]
         return Some(q);
     }
     // another way of closing them is another robot
-    closed(model, q, before).filter(|closed| closed.iter().zip(before).all(|(a, b)| (a - b).abs() < 1.0))
+    model.closed_from(q, before).filter(|closed| closed.iter().zip(before).all(|(a, b)| (a - b).abs() < 1.0))
 }

@@ -160,6 +160,21 @@ impl JointParameter {
     }
 }
 
+impl<T: Real> JointEffects<T> {
+    /// The same without what belongs to this parameter.
+    #[must_use]
+    pub fn without(self, parameter: JointParameter) -> Self {
+        match parameter {
+            JointParameter::RotorInertia => JointEffects { rotor_inertia: None, ..self },
+            JointParameter::Damping => JointEffects { damping: T::zero(), ..self },
+            JointParameter::Coulomb => JointEffects { coulomb: Coulomb::Off, ..self },
+            // no file has one
+            JointParameter::Offset => self,
+            JointParameter::Stiffness => JointEffects { stiffness: T::zero(), ..self },
+        }
+    }
+}
+
 impl<T: Real> Load<T> {
     /// m, m c, Σ (xx, xy, xz, yy, yz, zz).
     pub fn to_array(self) -> [T; PER_BODY] {

@@ -374,8 +374,25 @@ const ASSEMBLY_STEPS: usize = 32;
 /// So far \[rad or m\] a dependent joint goes in one of them, and so near loops come \[m\], or the way ends there: a singular pose is near.
 const LONGEST_STEP: f64 = 0.4;
 const CLOSED: f64 = 1e-9;
+/// Newton's steps from one row of a motion to the next, and how near loops have to come then \[m\].
+const STEPS_ALONG_MOTIONS: usize = 20;
+const CLOSED_ALONG_MOTIONS: f64 = 1e-6;
 
 impl Model<f64> {
+    fn is_closed(&self, q: &[f64], within: f64) -> bool {
+        self.gaps(q).iter().all(|gap| gap.abs() < within)
+    }
+
+    /// q with what loops determine, looked for by Newton's method from where it was `before`; `None` where loops do not close to a micrometre.
+    pub fn closed_from(&self, mut q: Vec<f64>, before: &[f64]) -> Option<Vec<f64>> {
+        for joint in self.dependent_joints() {
+            let own = joint.iq..joint.iq + joint.kind.nq();
+            q[own.clone()].copy_from_slice(&before[own]);
+        }
+        let (q, _) = self.close_loops(&q, STEPS_ALONG_MOTIONS);
+        self.is_closed(&q, CLOSED_ALONG_MOTIONS).then_some(q)
+    }
+
     /// The configuration that is reached from [home](Closure::home) on the way to these independent coordinates: theirs, or the last one before loops can no
     /// longer be closed.
     pub fn assembled(&self, q: &[f64]) -> Vec<f64> {
@@ -389,14 +406,15 @@ impl Model<f64> {
         let step: Vec<f64> = way.iter().map(|x| x / ASSEMBLY_STEPS as f64).collect();
         for _ in 0..ASSEMBLY_STEPS {
             let next = crate::algorithms::integrate(self, &at, &step);
-            let y = self.tree_positions(&next);
-            let is_closed = self.closure.loops.iter().flat_map(|of| self.gap(of, &y)).all(|gap| gap.abs() < CLOSED);
             let goes_far = |body: BodyId| {
                 let joint = &self.bodies[body].joint;
                 let ends = joint.coordinates(&next).iter().zip(joint.coordinates(&at));
                 ends.into_iter().any(|(to, from)| (to - from).abs() >= LONGEST_STEP)
             };
-            if !is_closed || next.iter().any(|x| !x.is_finite()) || self.closure.dependents().any(goes_far) {
+            if !self.is_closed(&next, CLOSED)
+                || next.iter().any(|x| !x.is_finite())
+                || self.closure.dependents().any(goes_far)
+            {
                 break;
             }
             at = next;

@@ -14,6 +14,7 @@ pub use crate::joint::JointKind;
 use crate::operators::operators;
 use crate::real::Real;
 use crate::spatial::{SpatialInertia, Sym3, Transform, Vec3};
+use alloc::format;
 use alloc::string::String;
 use alloc::vec;
 use alloc::vec::Vec;
@@ -64,6 +65,14 @@ impl Joint {
     /// Its part of qd, qdd or tau.
     pub fn rates<'a, T>(&self, rates: &'a [T]) -> &'a [T] {
         &rates[self.iv..self.iv + self.kind.nv()]
+    }
+
+    /// Names of its entries of q (`order` 0), of q̇ and q̈ (1) or of τ (2): its own where it has one coordinate, else `base.x`, `base.y`, ….
+    pub fn entry_names(&self, order: usize) -> Vec<String> {
+        match self.kind.is_single() {
+            true => vec![self.name.clone()],
+            false => self.kind.row().entries[order].iter().map(|entry| format!("{}.{entry}", self.name)).collect(),
+        }
     }
 }
 
@@ -273,6 +282,20 @@ impl<T: Real> Model<T> {
         let mut joints: Vec<&Joint> = self.free_joints().collect();
         joints.sort_by_key(|joint| joint.iv);
         joints
+    }
+
+    /// Coordinates q at which joints do nothing, or the nearest within their ranges; of a robot with loops those in which these were closed.
+    pub fn neutral(&self) -> Vec<T> {
+        if !self.closure.is_empty() {
+            return self.closure.home.clone();
+        }
+        let mut q = vec![T::zero(); self.nq()];
+        for joint in self.free_joints() {
+            for (q, neutral) in q[joint.iq..].iter_mut().zip(joint.kind.row().neutral) {
+                *q = T::constant(neutral.max(joint.limits.lower).min(joint.limits.upper).into());
+            }
+        }
+        q
     }
 
     /// Whether its base floats.
