@@ -68,7 +68,8 @@ pub(super) fn prepare(source: &Source, options: &Options) -> Result<Prepared, Di
         let complaint = scene::messages::function_not_of_scene(function.name());
         options.scene.places.complain(&path_of(function), complaint, &mut diagnostics);
     }
-    let has_columns = |function: &Function| function.has_axis(Extent::BaseParameters);
+    let of_joints = [Extent::BaseParameters, Extent::RegressorEntries];
+    let has_columns = |function: &Function| of_joints.into_iter().any(|extent| function.has_axis(extent));
     if !options.scene.regressor.is_empty() && !functions.is_empty() && !functions.iter().any(has_columns) {
         let names: Vec<&str> = Function::known().filter(has_columns).map(Function::name).collect();
         options.scene.places.complain("regressor", scene::messages::regressor_unused(&names), &mut diagnostics);

@@ -88,6 +88,7 @@ fn written(
         diagnostics.push(messages::not_written(format.name));
         return None;
     };
+    by_magnitudes(&mut robot);
     springs::by_numbers(&mut robot, &model);
     for loss in writer.losses {
         lose(loss, format, options.lossy, &mut robot, diagnostics);
@@ -103,6 +104,14 @@ fn written(
             diagnostics.push(messages::not_as_read(format.name, &difference).at(&robot.name.place));
             None
         }
+    }
+}
+
+/// Of limits that are negative the magnitude was read, with a warning.
+fn by_magnitudes(robot: &mut Description) {
+    let limits = robot.joints.iter_mut().map(|joint| &mut joint.limits);
+    for limit in limits.flat_map(|limits| [&mut limits.velocity, &mut limits.effort]).flatten() {
+        limit.value = limit.value.abs();
     }
 }
 

@@ -32,6 +32,7 @@ pub const CODES: &[&str] = &[
     "missing-attribute",
     "repeated-element",
     "misspelt-element",
+    "extension-left-out",
     "unknown-attribute",
     "empty-name",
     "not-a-number",
@@ -269,6 +270,14 @@ pub fn repeated_element(owner: &str, element: &str) -> D {
 pub fn misspelt_element(owner: &str, element: &str, known: &str) -> D {
     D::warning("misspelt-element", format!("unknown element `<{}>` in {owner}, ignored", cut(element)))
         .help(format!("did you mean `<{known}>`?"))
+}
+
+/// Dynamics in an extension that is not read.
+pub fn extension_left_out(extension: &str, element: &str) -> D {
+    let what = format!("`<{}>` of `<{}>` is not read", cut(element), cut(extension));
+    D::warning("extension-left-out", what).detail("it may change the dynamics of the robot").help(
+        "write what it means for the robot where the format has a place for it, or in TOML (`straightline convert`)",
+    )
 }
 
 /// An attribute that the element does not have.

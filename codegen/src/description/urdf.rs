@@ -49,6 +49,7 @@ fn read_document(mut reader: FileReader, document: &Document) -> Option<Descript
         None => reader.value("robot".to_string(), &tag(root)),
     };
     let mut description = Description::new(&FORMAT, name);
+    let mut rotors = Vec::new();
     for node in children(root) {
         match local_name(root, node) {
             Some("link") => description.add_link(read_link(&mut reader, node)),
@@ -56,13 +57,51 @@ fn read_document(mut reader: FileReader, document: &Document) -> Option<Descript
                 let joint = read_joint(&mut reader, node, &mut description.couplings);
                 description.add_joint(joint);
             }
+            Some("transmission") if has_rotor(node) => rotors.push(node),
             Some(name) if CLOSING.contains(&name) => reader.complain(&tag(node), messages::urdf_loop(name)),
             _ => skip(&mut reader, "the robot", node, &["link", "joint"]),
         }
     }
+    rotors.into_iter().for_each(|node| read_rotor(&mut reader, node, &mut description));
     description.ignored = reader.into_ignored();
     float_base(&mut description);
     Some(description)
+}
+
+/// Drake's words for the inertia of a rotor and its gear, whose prefix many files do not declare.
+const ROTOR: [[&str; 2]; 2] = [["rotor_inertia", "drake_rotor_inertia"], ["gear_ratio", "drake_gear_ratio"]];
+
+fn has_rotor(transmission: Node) -> bool {
+    transmission.descendants().any(|node| ROTOR[0].contains(&node.tag_name().name()))
+}
+
+/// A transmission of one joint whose actuator has a rotor.
+fn read_rotor(reader: &mut FileReader, node: Node, robot: &mut Description) {
+    let named = |names: &[&str]| {
+        node.descendants().filter(|child| names.contains(&child.tag_name().name())).collect::<Vec<_>>()
+    };
+    let owner = "the rotor of a transmission";
+    let (joints, [rotors, ratios]) = (named(&["joint"]), ROTOR.map(|words| named(&words)));
+    let ([joint], [rotor]) = (&joints[..], &rotors[..]) else {
+        let help = "write a transmission for each joint, or `rotor_inertia` in TOML";
+        let why = "several joints would share rotors";
+        reader.complain(&tag(node), messages::not_supported_yet("a transmission", "rotor_inertia", why, help));
+        return;
+    };
+    let Some(name) = required(reader, "<transmission>", *joint, "name", "name=\"...\"") else { return };
+    let names: Vec<String> = robot.joints.iter().map(|joint| joint.name.value.clone()).collect();
+    let Some(index) = names.iter().position(|own| own == name.value()) else {
+        let names: Vec<&str> = names.iter().map(String::as_str).collect();
+        reader.complain(&name.range_value(), messages::unknown_word("joint of a transmission", name.value(), &names));
+        return;
+    };
+    let mut value = |node: &Node| {
+        let attribute = required(reader, owner, *node, "value", "value=\"0\"")?;
+        number(reader, owner, attribute, Range64::Finite)
+    };
+    let (inertia, ratio) = (value(rotor), ratios.first().and_then(&mut value));
+    let drive = &mut robot.joints[index].drive;
+    (drive.rotor_inertia, drive.gear_ratio) = (inertia, ratio);
 }
 
 /// A link without mass that carries one floating joint at its origin, and nothing else, is the world: the link on that joint is a floating base.
@@ -115,7 +154,32 @@ fn skip(reader: &mut FileReader, owner: &str, node: Node, known: &[&str]) {
             return;
         }
     }
+    for what in left_out(node) {
+        reader.complain(&tag(what), messages::extension_left_out(name, what.tag_name().name()));
+    }
     reader.ignore(name, &tag(node));
+}
+
+/// What an extension says of the dynamics: words of simulators, and parts of a robot that stand where none is looked for.
+fn left_out<'a, 'i>(extension: Node<'a, 'i>) -> Vec<Node<'a, 'i>> {
+    const OF_COMPILERS: [&str; 5] = ["balanceinertia", "boundinertia", "boundmass", "inertiafromgeom", "settotalmass"];
+    let name = |node: &Node<'a, 'i>| node.tag_name().name();
+    let is = |node: &Node, words: &[&str]| node.text().is_some_and(|text| words.contains(&text.trim()));
+    let has_inertia =
+        |node: &Node| node.descendants().any(|inside| ["inertial", "axis"].contains(&inside.tag_name().name()));
+    let counts = |node: &Node<'a, 'i>| match (name(&extension), name(node)) {
+        ("gazebo", "springStiffness") => !is(node, &["0", "0.0"]),
+        ("gazebo", "turnGravityOff") => !is(node, &["0", "false"]),
+        ("gazebo", "gravity") => is(node, &["0", "false"]),
+        ("mujoco", "option") => node.attribute("gravity").is_some(),
+        ("mujoco", "compiler") => OF_COMPILERS.iter().any(|word| node.attribute(*word).is_some()),
+        (_, "link" | "joint") => has_inertia(node),
+        _ => false,
+    };
+    match name(&extension) {
+        "gazebo" | "mujoco" => children(extension).filter(counts).collect(),
+        _ => extension.descendants().skip(1).filter(counts).collect(),
+    }
 }
 
 /// The children of `node` with the names `names`, each at most once; others are skipped.

@@ -85,6 +85,7 @@ pub const ALL: &[Code] = &[
     code("error-budget-output", Error, "A budget of errors for what is no output."),
     code("error-over-budget", Error, "Bounds of rounding errors that are greater than they may be."),
     code("error-unbounded", Error, "Rounding errors that have no bound, where one is demanded."),
+    code("extension-left-out", Warning, "Dynamics in an extension of a robot file that is not read."),
     code("figure-unknown", Error, "A budget of what machine code does not say."),
     code("figures-elsewhere", Error, "Figures of machine code that needs more than `core`."),
     code("file-too-large", Error, "A file larger than the readers take."),

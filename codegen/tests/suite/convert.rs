@@ -146,6 +146,15 @@ fn random_robots_of_every_notation_are_the_same_in_every_format() {
     }
 }
 
+/// Of a greatest effort below zero the magnitude is read, and written.
+#[test]
+fn limits_below_zero_are_written_as_they_are_read() {
+    let text = "<robot name=\"r\"><link name=\"b\"/><link name=\"l\"><inertial><mass value=\"1\"/><inertia ixx=\"1\" iyy=\"1\" izz=\"1\"/></inertial></link>\
+                <joint name=\"j\" type=\"revolute\"><parent link=\"b\"/><child link=\"l\"/><limit lower=\"-1\" upper=\"1\" effort=\"-10\" velocity=\"-2\"/></joint></robot>";
+    let texts = there_and_back("limits", &Source::new("limits.urdf", text), ConvertOptions::default());
+    assert!(texts.len() > 2 && texts.iter().all(|(_, text)| text.contains("10") && !text.contains("effort=\"-")));
+}
+
 /// Few digits, right angles cut anywhere, dust, masses and units of every size.
 #[test]
 fn robots_as_people_write_them_are_the_same_in_every_format() {

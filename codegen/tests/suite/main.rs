@@ -59,6 +59,7 @@ mod outlining;
 mod paired_constants;
 mod parameter_derivatives;
 mod ptx_machine;
+mod random_joints;
 mod ranges;
 mod readback;
 mod reduced_forms;

@@ -6,6 +6,8 @@
 use std::time::{Duration, Instant};
 use straightline_codegen::diagnostic::Source;
 use straightline_codegen::model::{load, ModelOptions};
+use straightline_core::model::Model;
+use straightline_core::Dd;
 
 /// A small file is read in milliseconds, one of 10 MB in seconds (parsers without optimisation): what grows with the
 /// square of the size takes hours. The margin is for machines under load.
@@ -60,6 +62,50 @@ pub(crate) fn spoilt(text: &str, odd: &[&str], seed: u64) -> String {
         }
     }
     tokens.concat()
+}
+
+/// So many spoilt texts, the first of them of the seed after `first`: none panics, and none takes long.
+pub(crate) fn read_spoilt(path: &str, text: &str, odd: &[&str], first: u64, count: u64) {
+    for seed in first + 1..=first + count {
+        let (start, source) = (Instant::now(), Source::new(path, spoilt(text, odd, seed)));
+        let (model, diagnostics) = load(&source, &ModelOptions::default());
+        assert_eq!(model.is_none(), diagnostics.has_errors(), "seed {seed}: {diagnostics}");
+        let _ = diagnostics.render();
+        assert!(start.elapsed() < SMALL, "seed {seed}: {:?}", start.elapsed());
+    }
+}
+
+/// Whatever one number of a text becomes, a robot of it is another one, or something is said. Numbers stand behind one of `opening`; those behind one
+/// of `meaningless` may be anything. How many there are.
+pub(crate) fn no_number_is_read_without_meaning(
+    path: &str,
+    text: &str,
+    opening: &[char],
+    meaningless: &[&str],
+) -> usize {
+    let printed = |text: &str| {
+        let (model, diagnostics) = load(&Source::new(path, text), &ModelOptions::default());
+        let robot = |m: Model<Dd>| format!("{:?} {:?} {:?} {:?}", m.bodies, m.frames, m.gravity, m.couplings);
+        (model.map(robot), diagnostics.is_empty())
+    };
+    let (plain, _) = printed(text);
+    let (mut at, mut changed) = (0, 0);
+    while let Some(found) = text[at..].find(|c: char| c.is_ascii_digit()) {
+        let start = at + found;
+        let end = start + text[start..].find(|c: char| !c.is_ascii_digit()).expect("the text ends otherwise");
+        at = end;
+        // what stands in a name of an element or attribute is no number, and an exponent none by itself
+        let before = &text[..start];
+        let is_number = before.ends_with(opening) && !before.ends_with("e-");
+        let is_meant = meaningless.iter().all(|word| !before.ends_with(word));
+        if !is_number || !is_meant || text[end..].starts_with('e') {
+            continue;
+        }
+        let (other, is_silent) = printed(&format!("{before}7{}", &text[end..]));
+        assert!(other != plain || !is_silent, "nothing follows from 7 in {}", &text[start.saturating_sub(60)..end]);
+        changed += 1;
+    }
+    changed
 }
 
 #[test]

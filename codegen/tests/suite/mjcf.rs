@@ -435,6 +435,22 @@ fn meshes_have_the_inertia_of_what_they_enclose() {
     same(&solid, &with("type=\"mesh\" mesh=\"m\"", "box.obj"), 1e-14);
     // the corners in f32
     same(&solid, &with("type=\"mesh\" mesh=\"m\"", "box.stl"), 1e-6);
+    // a box of which a corner is pushed in: parts of its volume have the other sign, seen from the centroid of its surface
+    let mut lines: Vec<String> =
+        std::fs::read_to_string(folder.join("box.obj")).expect("it is there").lines().map(str::to_string).collect();
+    lines[0] = "v 1.05 2.1 3.15".to_string();
+    std::fs::write(folder.join("dent.obj"), lines.join("\n")).expect("it can be written");
+    let dented = |compiler: &str, mesh: &str| {
+        let assets =
+            format!("<compiler meshdir=\".\" {compiler}/><asset><mesh name=\"m\" file=\"dent.obj\" {mesh}/></asset>");
+        let text = robot(&assets, &format!("<body>{joints}<geom type=\"mesh\" mesh=\"m\"/></body>"));
+        model_of(&folder.join("robot.xml").to_string_lossy(), &text)
+    };
+    let mass = |model: &Model<Dd>| model.bodies.last().expect("a body").inertia.mass.to_f64();
+    let (exact, legacy) = (dented("", "inertia=\"exact\""), dented("", ""));
+    assert!((mass(&legacy) / mass(&exact) - 1.0).abs() > 1e-3, "{} {}", mass(&legacy), mass(&exact));
+    same(&exact, &dented("exactmeshinertia=\"true\"", ""), 1e-14);
+    same(&legacy, &dented("exactmeshinertia=\"true\"", "inertia=\"legacy\""), 1e-14);
     std::fs::remove_dir_all(&folder).expect("it was made here");
 }
 

@@ -463,6 +463,14 @@ fn slow_proof_that_regressors_in_scenes_are_the_second_authors() {
     }
 }
 
+/// Of what is not zero there are columns of joints, too.
+#[test]
+fn entries_alone_may_have_columns_of_joints() {
+    let scene = "[outputs]\nfunctions = [\"torque_regressor_entries\"]\n[regressor]\ncoulomb = true\n";
+    let verification = verified("planar2r.urdf", scene);
+    assert!(verification.passes() && verification.functions.len() == 1, "{:?}", verification.functions);
+}
+
 /// Forces are linear in the parameters, so that their derivative is a difference; and H ∂q̈/∂π = −∂τ/∂π.
 #[test]
 fn derivatives_by_a_payload_are_those_of_the_second_author() {

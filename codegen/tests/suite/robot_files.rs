@@ -41,6 +41,37 @@ fn files(folder: &str) -> Vec<PathBuf> {
     paths
 }
 
+/// Drake's rotors, with a prefix that is declared and with one that is not, as TOML has them.
+#[test]
+fn rotors_of_transmissions_are_read() {
+    let urdf = |top: &str, transmission: &str| {
+        format!(
+            "<robot name=\"r\"{top}><link name=\"b\"/><link name=\"l\"><inertial><mass value=\"1\"/><inertia ixx=\"1\" iyy=\"1\" izz=\"1\"/></inertial></link>\
+             <joint name=\"j\" type=\"continuous\"><parent link=\"b\"/><child link=\"l\"/></joint>{transmission}</robot>"
+        )
+    };
+    let actuator =
+        "<actuator name=\"m\"><drake:rotor_inertia value=\"2e-4\"/><drake:gear_ratio value=\"50\"/></actuator>";
+    let transmission = format!("<transmission><type>transmission_interface/SimpleTransmission</type><joint name=\"j\"><hardwareInterface>effort</hardwareInterface></joint>{actuator}</transmission>");
+    for top in ["", " xmlns:drake=\"http://drake.mit.edu\""] {
+        let (model, said) = model_of("drake.urdf", &urdf(top, &transmission), &ModelOptions::default());
+        let rotor = model.bodies[0].effects.rotor_inertia.expect("it has one").to_f64();
+        assert!((rotor - 0.5).abs() < 1e-15 && codes(&said).is_empty(), "{rotor} {said}");
+    }
+    let without = transmission.replace(actuator, "");
+    let (model, _) = model_of("plain.urdf", &urdf("", &without), &ModelOptions::default());
+    assert_eq!(model.bodies[0].effects.rotor_inertia, None);
+    for (old, new, code) in [
+        ("name=\"j\"", "name=\"i\"", "unknown-word"),
+        ("<joint name", "<joint name=\"j\"/><joint name", "not-supported-yet"),
+        ("2e-4", "heavy", "not-a-number"),
+    ] {
+        let source = Source::new("drake.urdf", urdf("", &transmission.replacen(old, new, 1)));
+        let (model, said) = load(&source, &ModelOptions::default());
+        assert!(model.is_none() && codes(&said).contains(&code), "{new}: {said}");
+    }
+}
+
 #[test]
 fn published_robots_load() {
     for folder in ["robots/descriptions", "generated_tests/count_robots"] {

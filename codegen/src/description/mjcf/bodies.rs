@@ -200,7 +200,8 @@ impl<'s> Mjcf<'s> {
         let given = Defaulted::alone(element);
         let help = "remove it: gravity then acts on the body";
         self.refuse_number(&given, "gravcomp", &owner, "a force would hold the body up", help);
-        if self.flag(&given, "mocap") == Some(true) {
+        let is_mocap = self.flag(&given, "mocap") == Some(true);
+        if is_mocap {
             self.ignore_as("mocap", element);
         }
         let class = element.attribute("childclass").and_then(|class| self.class(class)).unwrap_or(class);
@@ -208,6 +209,16 @@ impl<'s> Mjcf<'s> {
         let mut contents = Contents { all: Vec::new(), frames: Vec::new(), link: name.clone() };
         self.add_contents(element, class, &mut contents);
         let joints = self.joints_in(&contents, &owner, is_base, moving);
+        if is_mocap && !joints.is_empty() {
+            let help = "remove it, or the joints of the body";
+            self.refuse_attribute(
+                element,
+                "mocap",
+                &owner,
+                "such a body is moved from outside, and joints move it",
+                help,
+            );
+        }
         if is_base {
             // the pose of a free body is its coordinate
         } else {

@@ -101,6 +101,9 @@ impl<'s> Mjcf<'s> {
                     continue;
                 }
                 (Some(parent), Some(name)) => {
+                    if self.classes.all.iter().any(|class| class.scope == scope && class.name == name.value) {
+                        self.complain(name, messages::duplicate_name("class of defaults", &name.value));
+                    }
                     self.classes.all.push(Class {
                         name: name.value.clone(),
                         scope,

@@ -153,7 +153,10 @@ impl<'s> Mjcf<'s> {
         }
         let mut size = size.map(Dd::from);
         let segment = match given.attribute("fromto") {
-            Some(_) if solid == Solid::Sphere => None,
+            Some(attribute) if solid == Solid::Sphere => {
+                self.complain(attribute, messages::geom_size(owner, "`fromto` is no place of a sphere"));
+                return None;
+            }
             Some(attribute) => {
                 let numbers = self.numbers(&format!("fromto of {owner}"), attribute, 6, 6)?;
                 let segment = segment([0, 1, 2].map(|i| numbers[i]), [3, 4, 5].map(|i| numbers[i]));
@@ -216,7 +219,10 @@ impl CompilerSettings<'_> {
     /// The inertia after what the compiler says of all of them.
     fn corrected(&self, mut inertial: WrittenInertial) -> WrittenInertial {
         let [least_mass, least_moment] = self.bounds;
-        inertial.mass.value = inertial.mass.value.max(least_mass);
+        // without a bound what is negative stays, and is complained of
+        if least_mass > 0.0 {
+            inertial.mass.value = inertial.mass.value.max(least_mass);
+        }
         if least_moment <= 0.0 && !self.balance {
             return inertial;
         }

@@ -39,7 +39,8 @@ impl<'s> Mjcf<'s> {
         let who = format!("mesh `{}`", name.value);
         let help = "write `<inertial>` in the body, or give the geom `mass=\"0\"`";
         let modes = &["exact", "legacy", "convex", "shell"];
-        let mode = mesh.attribute("inertia").and_then(|_| self.word(&mesh, "inertia", modes)).unwrap_or("legacy");
+        let usual = if self.settings[element.scope].exact_meshes { "exact" } else { "legacy" };
+        let mode = mesh.attribute("inertia").and_then(|_| self.word(&mesh, "inertia", modes)).unwrap_or(usual);
         if ["convex", "shell"].contains(&mode) {
             self.refuse_attribute(element, "inertia", &who, "only `exact` and `legacy` are computed", help);
             return None;

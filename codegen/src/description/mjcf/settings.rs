@@ -23,6 +23,8 @@ pub(super) struct CompilerSettings<'s> {
     pub balance: bool,
     /// The mass of all bodies \[kg\], where it is given.
     pub total_mass: Option<Noted<f64>>,
+    /// Inertias of meshes are exact where they do not say themselves: what files said before meshes did.
+    pub exact_meshes: bool,
     /// Folder of meshes, relative to the file.
     pub mesh_folder: Option<&'s str>,
     /// File names count without their folders.
@@ -40,6 +42,7 @@ impl Default for CompilerSettings<'_> {
             bounds: [0.0; 2],
             balance: false,
             total_mass: None,
+            exact_meshes: false,
             mesh_folder: None,
             strips_paths: false,
         }
@@ -106,6 +109,9 @@ impl<'s> Mjcf<'s> {
                 self.settings[element.scope].bounds[i] = bound;
             }
         }
+        if let Some(exact) = self.flag(&given, "exactmeshinertia") {
+            self.settings[element.scope].exact_meshes = exact;
+        }
         if let Some(balance) = self.flag(&given, "balanceinertia") {
             self.settings[element.scope].balance = balance;
         }
@@ -133,6 +139,7 @@ impl<'s> Mjcf<'s> {
     }
 
     fn read_option(&mut self, element: &'s Element) {
+        self.check_attributes(element, "the option", vocabulary::OPTION);
         let given = Defaulted::alone(element);
         if let (Some(gravity), Some(attribute)) =
             (self.some_numbers(&given, "gravity", "the option"), element.attribute("gravity"))

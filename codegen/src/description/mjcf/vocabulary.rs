@@ -22,6 +22,12 @@ pub(super) const COMPILER: &str =
     "alignfree angle assetdir autolimits balanceinertia boundinertia boundmass conflict convexhull coordinate \
     discardvisual eulerseq exactmeshinertia fitaabb fusestatic inertiafromgeom inertiagrouprange meshdir \
     passthrough savecanonical savecompiled saveinertial settotalmass strippath texturedir usethread";
+/// Of the option.
+pub(super) const OPTION: &str =
+    "actuatorgroupdisable apirate ccd_iterations ccd_tolerance collision cone density disableactuator gravity impratio \
+    integrator iterations jacobian ls_iterations ls_tolerance magnetic mpr_iterations mpr_tolerance noslip_iterations \
+    noslip_tolerance o_friction o_margin o_solimp o_solref sdf_initpoints sdf_iterations sleep_tolerance solver \
+    timestep tolerance viscosity wind";
 /// Of an equality of joints.
 pub(super) const EQUALITY: &str = "active class joint1 joint2 name polycoef solimp solref";
 /// Of a connection of two bodies.
