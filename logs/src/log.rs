@@ -153,7 +153,16 @@ impl LogRecorder {
             columns.iter_mut().filter(|c| !c.is_empty()).for_each(|c| c.resize(rows, f64::NAN));
         }
         self.log.others = others;
+        self.log.clear_blank_columns();
         self.log
+    }
+}
+
+impl JointLog {
+    /// Columns without a number become empty: messages write NaN where a joint has none of a quantity.
+    fn clear_blank_columns(&mut self) {
+        let columns = self.columns.iter_mut().flatten();
+        columns.filter(|column| column.iter().all(|x| x.is_nan())).for_each(Vec::clear);
     }
 }
 
@@ -198,6 +207,9 @@ pub fn from_columns(columns: Vec<(String, Vec<f64>)>) -> Result<JointLog, LogErr
         }
         columns[place] = numbers;
     }
+    if names.iter().all(|name| name.is_empty()) {
+        return wrong("the file is empty".to_string(), "log a motion");
+    }
     let form = "columns are t [s], q.JOINT, qd.JOINT, tau.JOINT or effort.JOINT, and qdd.JOINT where it is known";
     let Some(times) = times else {
         return wrong(format!("no column `t`; there are {}", names.join(", ")), form);
@@ -205,8 +217,12 @@ pub fn from_columns(columns: Vec<(String, Vec<f64>)>) -> Result<JointLog, LogErr
     if log.joints.is_empty() {
         return wrong(format!("no column of a joint; there are {}", names.join(", ")), form);
     }
+    if times.is_empty() {
+        return wrong("the log has no rows".to_string(), "log a motion");
+    }
     let joints = log.joints.len();
     log.columns.iter_mut().for_each(|columns| columns.resize(joints, Vec::new()));
     log.times = times;
+    log.clear_blank_columns();
     Ok(log)
 }

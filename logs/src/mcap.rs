@@ -5,6 +5,7 @@
 use crate::failure::LogError;
 use crate::joint_state::{self, JointState};
 use crate::log::{JointLog, LogQuantity, LogRecorder, LogTopic};
+use crate::odometry;
 use crate::records::{damaged, for_each_record};
 use crate::transforms::{self, StampedTransform};
 use ::mcap::records::{MessageHeader, Record};
@@ -45,6 +46,8 @@ impl LoggedFrames {
 /// A pose of a file.
 #[derive(Clone, Debug, PartialEq)]
 pub struct LoggedPose {
+    /// The topic that has it.
+    pub topic: String,
     /// Time stamp \[ns\].
     pub stamp: i64,
     /// The frame in which the pose is.
@@ -55,9 +58,33 @@ pub struct LoggedPose {
     pub translation: [f64; 3],
     /// Its axes: quaternion x, y, z, w.
     pub rotation: [f64; 4],
+    /// Linear \[m/s\] and angular velocity \[rad/s\] in its own axes, where the message has them.
+    pub twist: Option<[f64; 6]>,
 }
 
-/// All poses of a file, in its order, of whatever topics have them.
+impl LoggedPose {
+    fn of(topic: &str, pose: &StampedTransform, twist: Option<[f64; 6]>) -> LoggedPose {
+        LoggedPose {
+            topic: topic.to_string(),
+            stamp: pose.stamp,
+            parent: pose.parent.to_string(),
+            child: pose.child.to_string(),
+            translation: pose.translation,
+            rotation: pose.rotation,
+            twist,
+        }
+    }
+}
+
+/// The poses of a message of a kind that has some.
+fn poses_of(kind: &str, topic: &str, data: &[u8]) -> Result<Vec<LoggedPose>, String> {
+    match kind {
+        odometry::TYPE => odometry::read(data).map(|found| vec![LoggedPose::of(topic, &found.pose, Some(found.twist))]),
+        _ => Ok(transforms::read(data)?.iter().map(|pose| LoggedPose::of(topic, pose, None)).collect()),
+    }
+}
+
+/// All poses of a file, in its order, of whatever topics have them: `tf2_msgs/msg/TFMessage` and `nav_msgs/msg/Odometry`.
 ///
 /// # Errors
 /// What is wrong with the bytes, and where.
@@ -67,20 +94,16 @@ pub fn frame_poses(bytes: &[u8]) -> Result<Vec<LoggedPose>, LogError> {
         match record {
             Record::Schema { header, .. } => _ = schemas.insert(header.id, header.name.clone()),
             Record::Channel(channel) => {
-                let is_wanted = schemas.get(&channel.schema_id).is_some_and(|kind| kind == transforms::TYPE);
-                channels.insert(channel.id, is_wanted && channel.message_encoding == "cdr");
+                let kind = schemas.get(&channel.schema_id).cloned().unwrap_or_default();
+                if [transforms::TYPE, odometry::TYPE].contains(&&kind[..]) && channel.message_encoding == "cdr" {
+                    channels.insert(channel.id, (kind, channel.topic.clone()));
+                }
             }
-            Record::Message { header, data } if channels.get(&header.channel_id) == Some(&true) => {
-                let help = format!("it is no {} in CDR, or damaged", transforms::TYPE);
-                let place = format!("a message at byte {at} of the file");
-                let read = transforms::read(data).map_err(|what| LogError::new(place, what, help))?;
-                found.extend(read.into_iter().map(|pose| LoggedPose {
-                    stamp: pose.stamp,
-                    parent: pose.parent.to_string(),
-                    child: pose.child.to_string(),
-                    translation: pose.translation,
-                    rotation: pose.rotation,
-                }));
+            Record::Message { header, data } => {
+                let Some((kind, topic)) = channels.get(&header.channel_id) else { return Ok(()) };
+                let help = format!("it is no {kind} in CDR, or damaged");
+                let place = format!("a message of {topic} at byte {at} of the file");
+                found.extend(poses_of(kind, topic, data).map_err(|what| LogError::new(place, what, help))?);
             }
             _ => {}
         }

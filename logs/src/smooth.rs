@@ -107,7 +107,7 @@ fn rates(values: &[f64], step: f64) -> Vec<f64> {
 }
 
 /// Weights of the derivative at `at` of the polynomial through values at these nodes.
-pub(crate) fn derivative_weights(nodes: &[f64], at: f64) -> Vec<f64> {
+pub fn derivative_weights(nodes: &[f64], at: f64) -> Vec<f64> {
     // l_i' = Σ_{j≠i} 1/(x_i − x_j) Π_{k≠i,j} (x − x_k)/(x_i − x_k)
     let n = nodes.len();
     let others = move |i: usize, j: usize| (0..n).filter(move |k| *k != i && *k != j);

@@ -9,6 +9,8 @@ use nalgebra::{DMatrix, DVector};
 const FAR: f64 = 6.0;
 /// Residuals below this part of the values' root mean square are rounding.
 const LEAST_NOISE: f64 = 1e-9;
+/// Outputs below this part of the greatest root mean square are as good as zero.
+const AT_REST: f64 = 1e-3;
 /// Weights and what is left out follow from what the fit before left.
 const ROUNDS: usize = 4;
 
@@ -111,7 +113,10 @@ impl FitData {
     /// The fit. Noise at instants up to `lags` apart may depend on each other.
     pub fn fit(&self, lags: usize) -> WeightedFit {
         let mut noise = self.rms(&vec![0.0; self.columns]);
-        let least: Vec<f64> = noise.iter().map(|x| (LEAST_NOISE * x).max(f64::MIN_POSITIVE.sqrt())).collect();
+        let greatest = noise.iter().fold(f64::MIN_POSITIVE.sqrt(), |most: f64, x| most.max(*x));
+        let least: Vec<f64> = noise.iter().map(|x| LEAST_NOISE * x.max(AT_REST * greatest)).collect();
+        // of an output that is zero all the time, as that of a joint without a drive, the first weight is none that hides all others
+        noise.iter_mut().for_each(|x| *x = x.max(AT_REST * greatest));
         noise.iter_mut().zip(&least).for_each(|(x, least)| *x = x.max(*least));
         let mut used: Vec<Vec<bool>> =
             self.blocks.iter().map(|block| vec![true; block.values.len() / self.outputs]).collect();

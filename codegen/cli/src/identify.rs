@@ -11,8 +11,9 @@ use similar::TextDiff;
 use std::io::Write;
 use std::path::{Path, PathBuf};
 use straightline_cli::identification::{
-    designed, fitted, identified, together, DesignDemand, Identification, LinkMap, RegressorModel,
+    designed, fitted, identified, together, DesignDemand, Identification, IdentifiedJoint, LinkMap, RegressorModel,
 };
+use straightline_cli::log_states::NamedRate;
 use straightline_cli::residual::usual_cutoff;
 use straightline_codegen::convert::renumber::renumbered;
 use straightline_codegen::description;
@@ -110,10 +111,9 @@ pub fn identify(a: &Identify) -> Result<(), CommandFailure> {
     if let Some(path) = &a.design {
         return design(a, &robot, path);
     }
-    let joints = robot.joints();
     let aligned = |paths: &[PathBuf]| -> Result<Vec<AlignedLog>, CommandFailure> {
         let all: Vec<Result<AlignedLog, CommandFailure>> =
-            paths.iter().map(|path| aligned_log(path, a.topic.as_deref(), &joints)).collect();
+            paths.iter().map(|path| log_of_forces(path, a.topic.as_deref(), &robot)).collect();
         all.into_iter().collect()
     };
     let (logs, others) = (aligned(&a.logs)?, aligned(&a.validate)?);
@@ -135,7 +135,11 @@ pub fn identify(a: &Identify) -> Result<(), CommandFailure> {
     let Some(found) = identified(&robot, &map, &whole) else {
         return Err(print::failure(format!("{}: a link is no body that could move", a.robot.display())));
     };
-    let text = written(&source, &robot, &map, &found)?;
+    if found.fit.fitted.untold.len() == robot.names.len() {
+        let text = format!("{}: the logs tell nothing of the robot", a.robot.display());
+        return Err(print::failure_with(text, &["log a motion of all joints, with their efforts"]));
+    }
+    let text = written(&source, &map, &found)?;
     let findings = IdentifyFindings {
         a,
         robot: &robot,
@@ -154,6 +158,20 @@ pub fn identify(a: &Identify) -> Result<(), CommandFailure> {
     Ok(())
 }
 
+/// A log that says what pushes the robot.
+fn log_of_forces(path: &Path, topic: Option<&str>, robot: &RegressorModel) -> Result<AlignedLog, CommandFailure> {
+    let log = aligned_log(path, topic, &robot.model)?;
+    let unmeasured: Vec<String> = log.report.without_effort.iter().map(|name| format!("tau.{name}")).collect();
+    match unmeasured.is_empty() {
+        true => Ok(log),
+        false => {
+            let text = format!("{}: the log does not say what pushes the base", path.display());
+            let help = format!("give it columns {}: 0 where nothing does, as in flight", unmeasured.join(", "));
+            Err(print::failure_with(text, &[&help]))
+        }
+    }
+}
+
 /// Writes a motion that excites all parameters.
 fn design(a: &Identify, robot: &RegressorModel, path: &Path) -> Result<(), CommandFailure> {
     let progress = print::spinner("designing a motion");
@@ -161,8 +179,7 @@ fn design(a: &Identify, robot: &RegressorModel, path: &Path) -> Result<(), Comma
     progress.finish_and_clear();
     let found = found.map_err(|why| print::failure(format!("{}: {why}", a.robot.display())))?;
     let (times, columns) = found.sampled(RATE);
-    let joints = robot.joints();
-    let named = |kind: &&str| joints.iter().map(|joint| format!("{kind}.{joint}")).collect::<Vec<_>>();
+    let named = |kind: &&str| robot.rates.iter().map(|rate| format!("{kind}.{}", rate.velocity)).collect::<Vec<_>>();
     let names = std::iter::once("t".to_string()).chain(["q", "qd", "qdd"].iter().flat_map(named)).collect();
     let row = |(i, t): (usize, &f64)| {
         std::iter::once(*t).chain(columns.iter().flat_map(|kind| kind.iter().map(move |column| column[i]))).collect()
@@ -185,14 +202,9 @@ fn design(a: &Identify, robot: &RegressorModel, path: &Path) -> Result<(), Comma
 }
 
 /// The robot file with the new numbers.
-fn written(
-    source: &Source,
-    robot: &RegressorModel,
-    map: &LinkMap,
-    found: &Identification,
-) -> Result<String, CommandFailure> {
+fn written(source: &Source, map: &LinkMap, found: &Identification) -> Result<String, CommandFailure> {
     let mut said = Diagnostics::new();
-    let text = renumbered(source, &found.numbers(robot, map), &mut said);
+    let text = renumbered(source, &found.numbers(map), &mut said);
     // what else there is to say of the file was said when it was read
     match text {
         Some(text) => Ok(text),
@@ -227,7 +239,7 @@ impl IdentifyFindings<'_> {
             "{}: {} base parameters of {} joints",
             self.robot.exact.name,
             self.robot.names.len(),
-            self.robot.joints().len()
+            self.robot.model.joints().len()
         )?;
         let [fitted, others] = self.logs;
         for (path, log) in self.a.logs.iter().chain(&self.a.validate).zip(fitted.iter().chain(others)) {
@@ -309,23 +321,21 @@ impl IdentifyFindings<'_> {
     }
 
     fn joint_rows(&self) -> Vec<Vec<String>> {
-        let joints = self.robot.joints();
-        let row = |((j, kind, by_file), x): (&(usize, JointParameter, f64), &f64)| {
-            let (file, word) = match kind {
+        let row = |(joint, x): (&IdentifiedJoint, &f64)| {
+            let (file, word) = match joint.kind {
                 JointParameter::Offset => ("no place for it".to_string(), "offset"),
-                other => (four_digits(*by_file), other.word()),
+                other => (four_digits(joint.by_file), other.word()),
             };
-            vec![joints[*j].to_string(), word.to_string(), file, four_digits(*x)]
+            vec![joint.name.clone(), word.to_string(), file, four_digits(*x)]
         };
-        let mut rows: Vec<(usize, Vec<String>)> =
-            self.map.joints.iter().zip(&self.found.joints).map(|pair| (pair.0 .0, row(pair))).collect();
-        rows.sort_by_key(|(joint, _)| *joint);
-        rows.into_iter().map(|(_, row)| row).collect()
+        let all = || self.map.joints.iter().zip(&self.found.joints);
+        // joint by joint
+        let each = self.map.joints.iter().filter(|joint| joint.kind == JointParameter::Damping);
+        each.flat_map(|joint| all().filter(|(own, _)| own.name == joint.name).map(row)).collect()
     }
 
     /// Errors of the file, of the fit and of what is written, on logs that were fitted, on each by a fit of the others, and on others.
     fn print_errors(&self, out: &mut impl Write) -> Result<(), CommandFailure> {
-        let joints = self.robot.joints();
         let zero = vec![0.0; self.robot.names.len()];
         let mut table = |title: &str, data: &FitData, models: &[(&str, &[f64])]| -> Result<(), CommandFailure> {
             writeln!(out, "\n{title}")?;
@@ -335,13 +345,10 @@ impl IdentifyFindings<'_> {
                 .chain(models.iter().map(|(_, beta)| *beta))
                 .map(|beta| data.rms(beta))
                 .collect();
-            let rows: Vec<Vec<String>> = joints
-                .iter()
-                .enumerate()
-                .map(|(j, name)| {
-                    std::iter::once(name.to_string()).chain(columns.iter().map(|c| four_digits(c[j]))).collect()
-                })
-                .collect();
+            let row = |(j, rate): (usize, &NamedRate)| {
+                std::iter::once(rate.effort.clone()).chain(columns.iter().map(|c| four_digits(c[j]))).collect()
+            };
+            let rows: Vec<Vec<String>> = self.robot.rates.iter().enumerate().map(row).collect();
             Ok(print_table(&mut *out, &head, &rows)?)
         };
         let found = self.found;

@@ -4,9 +4,11 @@ use crate::motion::{columns, Columns};
 use crate::{files, lerobot, print, CommandFailure};
 use std::io::Write;
 use std::path::Path;
+use straightline_cli::base_motion::{add_base, no_base, unlogged_base};
 use straightline_cli::experiment::parquet;
+use straightline_cli::log_states::{log_demand, with_whole_states};
 use straightline_codegen::diagnostic::six_digits;
-use straightline_core::model::Model;
+use straightline_core::model::{Joint, Model};
 use straightline_jit::LoadError;
 use straightline_logs::align::{align, AlignedLog, LogReport};
 use straightline_logs::log::{from_columns, JointLog, LogQuantity};
@@ -19,9 +21,26 @@ use straightline_view::{frame_poses, ViewedRun};
 /// The frame in which poses are.
 const WORLD: &str = "world";
 
-/// A log for the joints of a robot.
-pub fn aligned_log(path: &Path, topic: Option<&str>, joints: &[&str]) -> Result<AlignedLog, CommandFailure> {
-    align(&log(path, topic)?, joints).map_err(|error| wrong(path, &error))
+/// A log of a robot's states.
+pub fn aligned_log(path: &Path, topic: Option<&str>, model: &Model<f64>) -> Result<AlignedLog, CommandFailure> {
+    let mut log = log(path, topic)?;
+    if let Some(base) = base_of_messages(path, &mut log, model)? {
+        return Err(wrong(path, &no_base(base)));
+    }
+    let aligned = align(&log, &log_demand(model));
+    aligned.and_then(|log| with_whole_states(model, log)).map_err(|error| wrong(path, &error))
+}
+
+/// Takes the base from messages of poses, where a log has no columns of it. The base of an MCAP file that says nothing of it.
+fn base_of_messages<'a>(
+    path: &Path,
+    log: &mut JointLog,
+    model: &'a Model<f64>,
+) -> Result<Option<&'a Joint>, CommandFailure> {
+    let Some(base) = unlogged_base(model, log).filter(|_| has_extension(path, "mcap")) else { return Ok(None) };
+    let poses = mcap::frame_poses(&bytes_of(path)?);
+    let is_there = poses.and_then(|poses| add_base(log, base, model, &poses)).map_err(|error| wrong(path, &error))?;
+    Ok((!is_there).then_some(base))
 }
 
 /// Says why a robot has no functions.
@@ -49,6 +68,10 @@ fn has_extension(path: &Path, wanted: &str) -> bool {
     path.extension().is_some_and(|e| e.eq_ignore_ascii_case(wanted))
 }
 
+fn bytes_of(path: &Path) -> std::io::Result<Vec<u8>> {
+    std::fs::read(path).map_err(|e| std::io::Error::new(e.kind(), format!("{}: {e}", path.display())))
+}
+
 /// The log of a file, whose kind its name says.
 fn log(path: &Path, topic: Option<&str>) -> Result<JointLog, CommandFailure> {
     files::note(path);
@@ -62,8 +85,7 @@ fn log(path: &Path, topic: Option<&str>) -> Result<JointLog, CommandFailure> {
         let table = parquet::read(path).map_err(|why| print::failure(format!("{}: {why}", path.display())))?;
         from_columns(columns(&table))
     } else {
-        let bytes =
-            std::fs::read(path).map_err(|e| std::io::Error::new(e.kind(), format!("{}: {e}", path.display())))?;
+        let bytes = bytes_of(path)?;
         if has_extension(path, "mcap") {
             mcap::read(&bytes, topic)
         } else if has_extension(path, "csv") {
@@ -94,8 +116,11 @@ pub fn mcap_bytes(table: &DataTable, model: &Model<f64>) -> Result<Vec<u8>, Comm
 }
 
 /// The columns of a log as runs have them: rows with all positions, in the order of time.
-pub fn run_columns(path: &Path) -> Result<Columns, CommandFailure> {
-    let JointLog { joints, times, columns, .. } = log(path, None)?;
+pub fn run_columns(path: &Path, model: &Model<f64>) -> Result<Columns, CommandFailure> {
+    let mut log = log(path, None)?;
+    // a base of which nothing is said is drawn standing still
+    base_of_messages(path, &mut log, model)?;
+    let JointLog { joints, times, columns, .. } = log;
     let positions = &columns[LogQuantity::Position as usize];
     let mut last = f64::NEG_INFINITY;
     let mut is_whole = |i: &usize| {
@@ -148,7 +173,7 @@ pub fn report_lines(report: &LogReport) -> Vec<String> {
             lines.push(format!("{n} {what}"));
         }
     };
-    count(report.incomplete, "rows left out that lack a number, or have one that is not finite");
+    count(report.incomplete, "rows left out that lack a number, or have one that is not finite or beyond 1e50");
     count(report.duplicates, "rows left out with the time stamp of the row before");
     count(report.reordered, "messages with joints in another order, or other joints, than the message before");
     count(report.unstamped, "messages without a time stamp of their own, taken at the time at which they were logged");
@@ -166,7 +191,10 @@ pub fn report_lines(report: &LogReport) -> Vec<String> {
     }
     for (what, names) in [
         ("joints of the log that the robot does not have", &report.unknown),
-        ("joints without velocity, whose positions are differentiated", &report.without_velocity),
+        ("joints that others determine, and that were not read", &report.determined),
+        ("without velocity, for which positions were differentiated", &report.without_velocity),
+        ("not in the log, and taken as zero, as forces do not depend on it", &report.without_position),
+        ("forces that are not measured", &report.without_effort),
         ("not read", &report.others),
     ] {
         if !names.is_empty() {

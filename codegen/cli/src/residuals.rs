@@ -8,6 +8,7 @@ use anstream::stdout;
 use clap::Args;
 use std::io::Write;
 use std::path::PathBuf;
+use straightline_cli::log_states::position_names;
 use straightline_cli::residual::payload::{last_link, UnitPayloads, PAYLOAD_PARAMETERS};
 use straightline_cli::residual::torques::TorqueModel;
 use straightline_cli::residual::{
@@ -53,7 +54,8 @@ pub fn help() -> String {
     format!(
         "\
 The log is MCAP with sensor_msgs/msg/JointState of ROS 2, or CSV or Parquet with the columns t, q.JOINT, qd.JOINT,
-tau.JOINT or effort.JOINT, and qdd.JOINT where accelerations are known. Gaps, jumps of the clock and whatever else is
+tau.JOINT or effort.JOINT, and qdd.JOINT where accelerations are known. A base that floats has columns q.BASE.qx, …, or
+messages nav_msgs/msg/Odometry or tf2_msgs/msg/TFMessage; what pushes it need not be measured. Gaps, jumps of the clock and whatever else is
 odd are listed. Friction is what the model lacks; numbers have their standard errors.
 
 Examples:
@@ -79,9 +81,6 @@ pub fn residuals(a: &Residuals) -> Result<(), CommandFailure> {
     let source = read(&a.robot)?;
     let model = TorqueModel::load(&source, &options).map_err(not_loaded)?;
     print::diagnostics(model.warnings(), Severity::Warning);
-    if let Some(why) = model.refusal() {
-        return Err(print::failure(format!("{}: the robot has no residuals by a log: {why}", a.robot.display())));
-    }
     let frame = a.payload.clone().or_else(|| last_link(&model.model).map(str::to_string));
     let units = frame.as_ref().and_then(|frame| UnitPayloads::at(&model.model, frame));
     if let (Some(frame), None) = (&a.payload, &units) {
@@ -90,8 +89,9 @@ pub fn residuals(a: &Residuals) -> Result<(), CommandFailure> {
         let help = format!("frames that move are {}", known.join(", "));
         return Err(print::failure_with(format!("no frame `{frame}` that moves"), &[help]));
     }
-    let joints = model.joints();
-    let aligned = aligned_log(&a.log, a.topic.as_deref(), &joints)?;
+    let aligned = aligned_log(&a.log, a.topic.as_deref(), &model.model)?;
+    // what pushes a base may weigh as much as any payload
+    let units = units.filter(|_| aligned.is_measured.iter().all(|is_measured| *is_measured));
     let cutoff = a.cutoff.unwrap_or_else(|| usual_cutoff(aligned.report.period));
     let residuals = residual_torques(&model, &aligned, cutoff);
     let explanation = explain(&aligned, &residuals, units.as_ref());
@@ -131,46 +131,53 @@ pub fn with_error((x, error): (f64, f64)) -> String {
 }
 
 impl Findings<'_> {
-    /// The unit of a joint's force.
-    pub fn unit(&self, joint: usize) -> &'static str {
-        self.model.model.joints()[joint].kind.units()[3]
+    /// What the forces are called, with their units.
+    pub fn efforts(&self) -> impl Iterator<Item = (&str, &'static str)> {
+        self.residuals.rates.iter().map(|rate| (rate.effort.as_str(), rate.unit))
     }
 
     /// The head of the figures of joints, and their rows.
     pub fn joint_table(&self) -> (Vec<&'static str>, Vec<Vec<String>>) {
         let head =
             vec!["joint", "rms", "rms (observer)", "bias", "offset", "viscous", "Coulomb", "explained", "episodes"];
-        let row = |(name, figure): (&str, &straightline_cli::residual::JointFigure)| {
-            let [offset, viscous, coulomb] = figure.fitted.map(with_error);
+        let row = |((name, _), figure): ((&str, _), &straightline_cli::residual::JointFigure)| {
+            let [offset, viscous, coulomb] =
+                figure.fitted.map_or([const { String::new() }; 3], |fitted| fitted.map(with_error));
             let numbers = [figure.rms[0], figure.rms[1], figure.bias].map(four_digits);
             let rest = [
                 offset,
                 viscous,
                 coulomb,
-                format!("{:.1} %", 100.0 * figure.explained),
+                match figure.explained > 0.0 {
+                    true => format!("{:.1} %", 100.0 * figure.explained),
+                    false => "nothing".to_string(),
+                },
                 figure.episodes.len().to_string(),
             ];
             std::iter::once(name.to_string()).chain(numbers).chain(rest).collect()
         };
-        (head, self.model.joints().into_iter().zip(&self.explanation.joints).map(row).collect())
+        (head, self.efforts().zip(&self.explanation.joints).map(row).collect())
     }
 
     /// Motion and residuals over time.
     fn table(&self) -> DataTable {
         // with the motion, so that pages can draw it
-        let kinds: [(&str, &Vec<Vec<f64>>); 6] = [
-            ("q", &self.log.q),
-            ("qd", &self.log.qd),
-            ("tau", &self.log.tau),
-            ("residual", &self.residuals.direct),
-            ("observer", &self.residuals.observed),
-            ("unexplained", &self.explanation.left),
+        let rates = &self.residuals.rates;
+        let forces: Vec<String> = rates.iter().map(|rate| rate.effort.clone()).collect();
+        let kinds: [(&str, Vec<String>, &Vec<Vec<f64>>); 6] = [
+            ("q", position_names(&self.model.model), &self.log.q),
+            ("qd", rates.iter().map(|rate| rate.velocity.clone()).collect(), &self.log.qd),
+            ("tau", forces.clone(), &self.log.tau),
+            ("residual", forces.clone(), &self.residuals.direct),
+            ("observer", forces.clone(), &self.residuals.observed),
+            ("unexplained", forces, &self.explanation.left),
         ];
-        let joints = self.model.joints();
-        let named = |(kind, _): &(&str, _)| joints.iter().map(|j| format!("{kind}.{j}")).collect::<Vec<_>>();
+        let named = |(kind, names, _): &(&str, Vec<String>, _)| {
+            names.iter().map(|name| format!("{kind}.{name}")).collect::<Vec<_>>()
+        };
         let names = std::iter::once("t".to_string()).chain(kinds.iter().flat_map(named)).collect();
         let row = |i: usize| {
-            let numbers = kinds.iter().flat_map(|(_, columns)| columns.iter().map(move |c| c[i]));
+            let numbers = kinds.iter().flat_map(|(_, _, columns)| columns.iter().map(move |c| c[i]));
             std::iter::once(self.log.times[i]).chain(numbers).collect()
         };
         DataTable { names, rows: (0..self.log.times.len()).map(row).collect() }
@@ -190,6 +197,13 @@ impl Findings<'_> {
 
     /// What is said of a payload.
     pub fn payload_lines(&self) -> Vec<String> {
+        let unmeasured = &self.log.report.without_effort;
+        if !unmeasured.is_empty() {
+            return vec![format!(
+                "no payload is looked for, as the log does not say what pushes the base; columns {} would (0 where nothing does)",
+                unmeasured.iter().map(|name| format!("tau.{name}")).collect::<Vec<_>>().join(", ")
+            )];
+        }
         let (Some(frame), Some(payload)) = (self.frame, &self.explanation.payload) else { return Vec::new() };
         if !payload.is_found {
             return vec![format!("no payload at {frame} that is more than noise")];
@@ -207,9 +221,8 @@ impl Findings<'_> {
 
     /// What the data cannot tell.
     pub fn untold_lines(&self) -> Vec<String> {
-        let joints = self.model.joints();
-        let of = |(joint, what): &(Option<usize>, &str)| match joint {
-            Some(joint) => format!("{what} of {}", joints[*joint]),
+        let of = |(rate, what): &(Option<usize>, &str)| match rate {
+            Some(rate) => format!("{what} of {}", self.residuals.rates[*rate].effort),
             None => format!("{what} of the payload"),
         };
         let untold: Vec<String> = self.explanation.untold.iter().map(of).collect();
@@ -221,17 +234,15 @@ impl Findings<'_> {
 
     /// Episodes of all joints, in the order of time.
     pub fn episode_rows(&self) -> Vec<Vec<String>> {
-        let joints = self.model.joints();
-        let mut all: Vec<_> = joints
-            .iter()
-            .enumerate()
+        let mut all: Vec<_> = self
+            .efforts()
             .zip(&self.explanation.joints)
-            .flat_map(|((j, name), figure)| figure.episodes.iter().map(move |e| (j, *name, *e)))
+            .flat_map(|(effort, figure)| figure.episodes.iter().map(move |e| (effort, *e)))
             .collect();
-        all.sort_by(|a, b| a.2.from.total_cmp(&b.2.from));
-        let row = |(j, name, e): &(usize, &str, straightline_logs::episodes::Episode)| {
+        all.sort_by(|a, b| a.1.from.total_cmp(&b.1.from));
+        let row = |((name, unit), e): &((&str, &str), straightline_logs::episodes::Episode)| {
             let times = [e.from, e.to].map(|t| format!("{t:.3} s"));
-            let peak = format!("{} {}", four_digits(e.peak), self.unit(*j));
+            let peak = format!("{} {}", four_digits(e.peak), unit);
             [vec![name.to_string()], times.to_vec(), vec![peak, format!("{:.0}", e.sigmas)]].concat()
         };
         all.iter().map(row).collect()

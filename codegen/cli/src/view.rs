@@ -113,7 +113,7 @@ fn look(robot: &Path, model: &Model<f64>) -> Result<ViewedLook, CommandFailure> 
 /// The columns of a file.
 fn of_file(path: &Path, model: &Model<f64>) -> Result<ViewedRun, CommandFailure> {
     if path.is_dir() || path.extension().is_some_and(|e| e.eq_ignore_ascii_case("mcap")) {
-        let columns = logs::run_columns(path)?;
+        let columns = logs::run_columns(path, model)?;
         return ViewedRun::of_columns(model, &columns).map_err(|failures| refused(Some(path), &failures));
     }
     let source = match parquet::is_parquet(path) {

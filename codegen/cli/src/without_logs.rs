@@ -60,6 +60,9 @@ pub fn mcap_bytes(
 
 /// The columns of a log.
 #[cfg(feature = "simulation")]
-pub fn run_columns(_: &std::path::Path) -> Result<Vec<(String, Vec<f64>)>, CommandFailure> {
+pub fn run_columns(
+    _: &std::path::Path,
+    _: &straightline_core::model::Model<f64>,
+) -> Result<Vec<(String, Vec<f64>)>, CommandFailure> {
     Err(left_out())
 }

@@ -2,6 +2,7 @@
 
 use straightline_logs::align::align;
 use straightline_logs::csv::read;
+use straightline_logs::demand::LogDemand;
 use straightline_logs::log::LogQuantity;
 use straightline_logs::threads::in_threads;
 
@@ -10,7 +11,7 @@ fn a_table_with_missing_numbers_is_a_log_that_says_so() {
     let text = "# a remark\nt, q.a, qd.a, effort.a, qdd.a, current\n0.5,1,2,3,4,9\n0.6,1.5,,3.5,,9\n0.7,2,2.5,nan,4,9\n0.8,2,2,3,4,9\n";
     let log = read(text.as_bytes()).expect("a log");
     assert_eq!((&log.joints[..], log.others[0].name.as_str()), (&["a".to_string()][..], "current"));
-    let found = align(&log, &["a"]).expect("two rows are complete");
+    let found = align(&log, &LogDemand::of_joints(&["a"])).expect("two rows are complete");
     assert_eq!((found.report.incomplete, &found.times[..]), (2, &[0.5, 0.8][..]));
     assert_eq!(found.qdd.expect("it has accelerations"), [[4.0, 4.0]]);
 }
@@ -26,7 +27,7 @@ fn seconds_since_the_epoch_keep_their_nanoseconds() {
 fn velocities_that_are_missing_are_differences_of_positions() {
     let rows: String = (0..20).map(|i| format!("{},{},0\n", 0.1 * f64::from(i), 0.01 * f64::from(i * i))).collect();
     let log = read(format!("t,q.a,tau.a\n{rows}").as_bytes()).expect("a log");
-    let found = align(&log, &["a"]).expect("a log");
+    let found = align(&log, &LogDemand::of_joints(&["a"])).expect("a log");
     assert_eq!(found.report.without_velocity, ["a"]);
     // of a parabola q = t² they are exact
     assert!(found.times.iter().zip(&found.qd[0]).all(|(t, qd)| (qd - 2.0 * t).abs() < 1e-12), "{:?}", found.qd);
@@ -84,4 +85,20 @@ fn what_threads_make_comes_in_order_and_their_panics_come_through() {
     assert!(in_threads(0, |k| k).is_empty());
     let panics = std::panic::catch_unwind(|| in_threads(8, |k| assert!(k < 5, "part {k}")));
     assert!(panics.is_err());
+}
+
+#[test]
+fn what_no_robot_measures_is_left_out_and_what_is_empty_is_said() {
+    let with = |rows: &str| read(format!("t,q.a,tau.a,effort.b\n{rows}").as_bytes());
+    let log = with("0,0.1,1,nan\n1,1e308,1,nan\n2,0.3,-1e60,nan\n3,0.4,2,nan\n").expect("a log");
+    let found = align(&log, &LogDemand::of_joints(&["a"])).expect("two rows are complete");
+    assert_eq!((found.report.incomplete, &found.q[0][..]), (2, &[0.1, 0.4][..]));
+    // a column without a number is none
+    let error = align(&log, &LogDemand::of_joints(&["b"])).expect_err("nothing is known of it");
+    assert!(
+        error.what.contains("no position of joint `b`") && error.what.contains("no effort of joint `b`"),
+        "{error}"
+    );
+    assert_eq!(with("").expect_err("it has no rows").what, "the log has no rows");
+    assert_eq!(read(b"").expect_err("it is empty").what, "the file is empty");
 }

@@ -3,6 +3,7 @@
 use super::common::{recorded, Noise, Sent};
 use mcap::Compression;
 use straightline_logs::align::align;
+use straightline_logs::demand::LogDemand;
 use straightline_logs::joint_state::JointState;
 use straightline_logs::{csv, mcap as file};
 
@@ -46,7 +47,7 @@ fn mutated_files_are_read_or_refused_with_a_place() {
             match file::read(&mutated(&bytes, &mut noise), None) {
                 Ok(log) => {
                     let joints: Vec<&str> = log.joints.iter().map(String::as_str).collect();
-                    let _ = align(&log, &joints);
+                    let _ = align(&log, &LogDemand::of_joints(&joints));
                 }
                 Err(error) => {
                     refused += 1;

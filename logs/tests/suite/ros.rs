@@ -4,9 +4,12 @@ use super::common::{recorded, Sent};
 use mcap::Compression;
 use straightline_logs::align::align;
 use straightline_logs::cdr::CdrReader;
+use straightline_logs::demand::LogDemand;
 use straightline_logs::joint_state::JointState;
 use straightline_logs::log::{from_columns, JointLog, LogQuantity};
 use straightline_logs::mcap as file;
+use straightline_logs::odometry::{self, Odometry};
+use straightline_logs::transforms::StampedTransform;
 
 const MS: i64 = 1_000_000;
 
@@ -28,7 +31,7 @@ fn joints_are_joined_by_name_whatever_their_order() {
         let velocity = log.column(LogQuantity::Velocity, 1);
         assert!(velocity[0] == 0.75 && velocity[1].is_nan() && velocity[2] == 0.125, "{velocity:?}");
         assert_eq!(log.others.iter().map(|t| (t.name.as_str(), t.messages)).collect::<Vec<_>>(), [("/remarks", 3)]);
-        let aligned = align(&log, &["wrist", "elbow"]).expect("two rows are complete");
+        let aligned = align(&log, &LogDemand::of_joints(&["wrist", "elbow"])).expect("two rows are complete");
         assert_eq!(aligned.q, [[-1.5, -1.0], [0.25, 0.75]]);
         assert_eq!((aligned.report.incomplete, &aligned.report.unknown[..]), (1, &["gripper".to_string()][..]));
     }
@@ -55,7 +58,8 @@ fn several_topics_with_joint_states_are_listed_until_one_is_named() {
 fn effort_that_is_absent_is_said_with_the_joint() {
     let bytes = recorded(&[Sent("/a", 5, &["shoulder", "elbow"], [&[1.0, 2.0], &[0.0, 0.0], &[]])], None);
     let log = file::read(&bytes, None).expect("it can be read");
-    let error = align(&log, &["shoulder", "wrist"]).expect_err("there is no effort, and no wrist");
+    let error =
+        align(&log, &LogDemand::of_joints(&["shoulder", "wrist"])).expect_err("there is no effort, and no wrist");
     let said = error.to_string();
     assert!(said.contains("no effort of joint `shoulder`") && said.contains("`wrist` is not in the log"), "{said}");
     assert!(error.help.contains("shoulder, elbow"), "{error:?}");
@@ -67,7 +71,7 @@ fn duplicates_gaps_and_jumps_of_the_clock_are_reported_and_cut() {
     let messages: Vec<Sent> =
         stamps.iter().map(|stamp| Sent("/a", *stamp, &["hinge"], [&[0.5], &[0.25], &[1.5]])).collect();
     let log = file::read(&recorded(&messages, None), None).expect("it can be read");
-    let found = align(&log, &["hinge"]).expect("rows are complete");
+    let found = align(&log, &LogDemand::of_joints(&["hinge"])).expect("rows are complete");
     assert_eq!(found.report.duplicates, 1);
     assert_eq!(found.report.gaps, [(0.004, 0.014)]);
     assert_eq!(found.report.jumps.len(), 1);
@@ -136,4 +140,18 @@ fn what_was_written_is_read_to_the_last_bit() {
     assert_eq!(log.others[0].name, "energy");
     assert!(found.times.iter().zip(&t).all(|(a, b)| (a - b).abs() < 1e-15), "stamps are of whole ns");
     assert_eq!(found, JointLog { times: found.times.clone(), others: Vec::new(), ..log });
+}
+
+#[test]
+fn odometry_is_read_with_its_twist() {
+    let (translation, rotation) = ([1.0, -2.0, 0.5], [0.0, 0.6, 0.0, 0.8]);
+    let pose = StampedTransform { stamp: 1_500_000_000, parent: "odom", child: "base_link", translation, rotation };
+    let message = Odometry { pose, twist: [0.1, 0.2, 0.3, -0.4, 0.5, -0.6] };
+    let bytes = odometry::bytes(&message).expect("it has room");
+    // header, child, pose, twist and two covariances: 4 + 8 + (4 + 5) + 3 + (4 + 10) + 6 + 8·(7 + 36 + 6 + 36)
+    assert_eq!(bytes.len(), 4 + 8 + 9 + 3 + 14 + 6 + 8 * 85);
+    assert_eq!(odometry::read(&bytes).expect("it is one"), message);
+    for cut in [0, 3, 10, 40, bytes.len() - 1] {
+        assert!(odometry::read(&bytes[..cut]).is_err(), "{cut} bytes");
+    }
 }

@@ -1,7 +1,7 @@
 //! Samples over time from CSV and JSON files, with the place of whatever is wrong.
 
 use super::messages as say;
-use straightline_codegen::diagnostic::{Diagnostics, Source};
+use straightline_codegen::diagnostic::{Diagnostics, Place, Source};
 
 /// Columns of numbers by name.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -33,8 +33,8 @@ pub fn read(source: &Source, diagnostics: &mut Diagnostics) -> Option<Columns> {
             None => found.push(say::column_missing("t", &columns.names()).at(&source.place(0..0))),
             Some([]) => found.push(say::not_samples("there is no row").at(&source.place(0..0))),
             Some(times) => {
-                if let Some(pair) = times.windows(2).find(|pair| pair[1] <= pair[0]) {
-                    found.push(say::time_goes_back(pair[1], pair[0]).at(&source.place(0..0)));
+                if let Some(k) = (1..times.len()).find(|k| times[*k] <= times[k - 1]) {
+                    found.push(say::time_goes_back(times[k], times[k - 1]).at(&row_place(source, k)));
                 }
             }
         }
@@ -57,14 +57,31 @@ pub fn table(source: &Source, diagnostics: &mut Diagnostics) -> Option<Columns> 
     columns.filter(|_| sound)
 }
 
+fn csv_reader(source: &Source) -> ::csv::Reader<&[u8]> {
+    ::csv::ReaderBuilder::new().trim(::csv::Trim::All).comment(Some(b'#')).from_reader(source.text().as_bytes())
+}
+
+/// The line of a position.
+fn line_place(source: &Source, position: Option<&::csv::Position>) -> Place {
+    let at = position.map_or(0, |p| (p.byte() as usize).min(source.text().len()));
+    let line = source.text()[at..].lines().next().map_or(0, str::len);
+    source.place(at..at + line)
+}
+
+/// Where a row stands; of JSON the file.
+fn row_place(source: &Source, row: usize) -> Place {
+    match source.path().ends_with(".json") {
+        true => source.place(0..0),
+        false => {
+            let record = csv_reader(source).into_records().nth(row).and_then(Result::ok);
+            line_place(source, record.as_ref().and_then(|record| record.position()))
+        }
+    }
+}
+
 fn csv(source: &Source, diagnostics: &mut Diagnostics) -> Option<Columns> {
-    let mut reader =
-        ::csv::ReaderBuilder::new().trim(::csv::Trim::All).comment(Some(b'#')).from_reader(source.text().as_bytes());
-    let place = |position: Option<&::csv::Position>| {
-        let at = position.map_or(0, |p| (p.byte() as usize).min(source.text().len()));
-        let line = source.text()[at..].lines().next().map_or(0, str::len);
-        source.place(at..at + line)
-    };
+    let mut reader = csv_reader(source);
+    let place = |position: Option<&::csv::Position>| line_place(source, position);
     let names = match reader.headers() {
         Ok(names) => names.clone(),
         Err(error) => {
@@ -72,7 +89,13 @@ fn csv(source: &Source, diagnostics: &mut Diagnostics) -> Option<Columns> {
             return None;
         }
     };
-    let mut columns: Vec<(String, Vec<f64>)> = names.iter().map(|name| (name.to_string(), Vec::new())).collect();
+    let mut columns: Vec<(String, Vec<f64>)> = Vec::new();
+    for name in &names {
+        if columns.iter().any(|(known, _)| known == name) {
+            diagnostics.push(say::not_samples(&format!("two columns are called `{name}`")).at(&place(None)));
+        }
+        columns.push((name.to_string(), Vec::new()));
+    }
     for record in reader.records() {
         let record = match record {
             Ok(record) => record,

@@ -7,7 +7,7 @@
 use super::regressor::RegressorModel;
 use crate::residual::torques::{evaluated, StateColumns};
 use std::f64::consts::{FRAC_PI_2, TAU};
-use straightline_core::model::Limits;
+use straightline_core::model::{Joint, Limits};
 use straightline_graph::expr::gradient;
 use straightline_graph::pass::dead_code;
 use straightline_jit::LoadedFunction;
@@ -119,8 +119,11 @@ impl DesignedMotion {
 /// Designs a motion.
 ///
 /// # Errors
-/// The robot cannot hold itself within its limits of effort, or no motion tells all parameters apart.
+/// A joint has several coordinates, the robot cannot hold itself within its limits of effort, or no motion tells all parameters apart.
 pub fn designed(robot: &RegressorModel, demand: DesignDemand) -> Result<DesignedMotion, String> {
+    if let Some(joint) = robot.model.joints().into_iter().find(|joint| !joint.kind.is_single()) {
+        return Err(format!("motions are designed for joints of one coordinate, and `{}` has several", joint.name));
+    }
     let (rooms, assumed) = rooms(robot);
     let design = MotionDesign::of(robot, rooms, demand.duration);
     let mut random = demand.seed;
@@ -155,7 +158,7 @@ pub fn designed(robot: &RegressorModel, demand: DesignDemand) -> Result<Designed
 fn rooms(robot: &RegressorModel) -> (Vec<JointRoom>, Vec<String>) {
     let mut assumed = Vec::new();
     let rooms = robot.exact.joints().into_iter().map(|joint| {
-        let Limits { lower, upper, velocity, effort } = joint.limits;
+        let Limits { lower, upper, velocity, effort } = with_followers(robot, joint);
         let free = if joint.kind.slides() { NO_LIMITS[1] } else { NO_LIMITS[0] };
         let has_range = lower.is_finite() && upper.is_finite() && upper > lower && upper - lower < 2.0 * TAU;
         // zeros are what some files write for none
@@ -171,6 +174,27 @@ fn rooms(robot: &RegressorModel) -> (Vec<JointRoom>, Vec<String>) {
         }
     });
     (rooms.collect(), assumed)
+}
+
+/// The limits of a joint by which it and those that follow it keep theirs.
+fn with_followers(robot: &RegressorModel, joint: &Joint) -> Limits {
+    let bodies = &robot.model.bodies;
+    let followers =
+        robot.model.couplings.iter().filter(|c| bodies[c.source].joint.name == joint.name && c.ratio != 0.0);
+    followers.fold(joint.limits, |limits, coupling| {
+        let own = bodies[coupling.body].joint.limits;
+        let [a, b] = [own.lower, own.upper].map(|end| (end - coupling.offset) / coupling.ratio);
+        // zeros are what some files write for none
+        let has_velocity = own.velocity > 0.0;
+        let velocity = if has_velocity { own.velocity / coupling.ratio.abs() } else { f64::INFINITY };
+        let most = if limits.velocity > 0.0 { limits.velocity } else { f64::INFINITY };
+        Limits {
+            lower: limits.lower.max(a.min(b)),
+            upper: limits.upper.min(a.max(b)),
+            velocity: most.min(velocity),
+            ..limits
+        }
+    })
 }
 
 /// A limit, and by how much a number exceeds it: in units of it, with the slope by the number.

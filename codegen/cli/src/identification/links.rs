@@ -4,7 +4,7 @@ use super::regressor::RegressorModel;
 use straightline_codegen::convert::renumber::NewInertial;
 use straightline_codegen::description::{Description, WrittenInertial};
 use straightline_core::base_parameters::{JointParameter, PER_BODY};
-use straightline_core::model::{Load, Model};
+use straightline_core::model::{Body, Load, Model};
 use straightline_core::spatial::Sym3;
 use straightline_core::Dd;
 use straightline_logs::consistent::{is_body, thickened};
@@ -14,7 +14,7 @@ const THINNEST: f64 = 1e-3;
 /// Digits that are written.
 const DIGITS: usize = 9;
 /// What is nothing, as a part of the numbers beside it.
-const DUST: f64 = 1e-9;
+pub(super) const DUST: f64 = 1e-9;
 
 /// A link whose numbers are looked for.
 #[derive(Clone, Debug, PartialEq)]
@@ -27,13 +27,26 @@ pub struct IdentifiedLink {
     pub known: [f64; PER_BODY],
 }
 
+/// A parameter of a joint that is looked for.
+#[derive(Clone, Debug, PartialEq)]
+pub struct IdentifiedJoint {
+    /// The joint's name.
+    pub name: String,
+    /// The force that shows it: the joint's, or that of the joint which it follows.
+    pub row: usize,
+    /// What it is.
+    pub kind: JointParameter,
+    /// What the file has.
+    pub by_file: f64,
+}
+
 /// How base parameters are made.
 #[derive(Clone, Debug, PartialEq)]
 pub struct LinkMap {
     /// Links with mass that move.
     pub links: Vec<IdentifiedLink>,
-    /// Joints' parameters: joint, kind, and value by the file.
-    pub joints: Vec<(usize, JointParameter, f64)>,
+    /// Joints' parameters, kind by kind.
+    pub joints: Vec<IdentifiedJoint>,
     /// Rows of a number per base parameter: ten columns per link, then one per parameter of a joint.
     pub made_of: Vec<Vec<f64>>,
     /// What is added: of masses that are not looked for.
@@ -79,7 +92,7 @@ impl LinkMap {
             .map(|parameter| columns.iter().map(|column| parameter.value(column).to_f64()).collect())
             .collect();
         let by_file = |row: &Vec<f64>| {
-            let numbers = links.iter().flat_map(|link| link.written).chain(joints.iter().map(|joint| joint.2));
+            let numbers = links.iter().flat_map(|link| link.written).chain(joints.iter().map(|joint| joint.by_file));
             row.iter().zip(numbers).map(|(y, x)| y * x).sum::<f64>()
         };
         let rest = robot.nominal.iter().zip(&made_of).map(|(value, row)| value - by_file(row)).collect();
@@ -96,16 +109,17 @@ impl LinkMap {
     }
 }
 
-/// The parameters of joints, kind by kind, as base parameters are made of them.
-fn joints(model: &Model<Dd>, kinds: &[JointParameter]) -> Vec<(usize, JointParameter, f64)> {
-    let bodies: Vec<_> = model.bodies_in_order().into_iter().map(|b| &model.bodies[b]).collect();
+/// The parameters of joints, kind by kind, as base parameters are made of them. Joints with several coordinates have none.
+fn joints(model: &Model<Dd>, kinds: &[JointParameter]) -> Vec<IdentifiedJoint> {
+    let order = model.bodies_in_order();
+    let singles = || order.iter().map(|b| (*b, &model.bodies[*b])).filter(|(_, body)| body.joint.kind.is_single());
     let of_kind = |kind: &JointParameter| {
-        let kind = *kind;
-        bodies
-            .iter()
-            .enumerate()
-            .map(move |(j, body)| (j, kind, kind.value(&body.effects).to_f64()))
-            .collect::<Vec<_>>()
+        let of_joint = |(b, body): (usize, &Body<Dd>)| {
+            let source = model.coupling_of(b).map_or(b, |coupling| coupling.source);
+            let (name, row) = (body.joint.name.clone(), model.bodies[source].joint.iv);
+            IdentifiedJoint { name, row, kind: *kind, by_file: kind.value(&body.effects).to_f64() }
+        };
+        singles().map(of_joint).collect::<Vec<_>>()
     };
     kinds.iter().flat_map(of_kind).collect()
 }
@@ -154,7 +168,8 @@ fn no_dust(x: f64, size: f64) -> f64 {
 pub fn new_inertial(link: &str, body: &[f64; PER_BODY]) -> NewInertial {
     let [m, hx, hy, hz, xx, xy, xz, yy, yz, zz] = *body;
     let mass = rounded(m);
-    let length = hx.hypot(hy).hypot(hz) / m;
+    // a link as large as its inertia, where its centre of mass is its origin
+    let length = (hx.hypot(hy).hypot(hz) / m).max(((xx + yy + zz).max(0.0) / m).sqrt());
     let com = [hx, hy, hz].map(|h| no_dust(rounded(h / m), length));
     // about the centre of mass that is written: I − m (c·c 1 − c cᵀ)
     let [x, y, z] = com;

@@ -1,14 +1,16 @@
 //! The equations of a log that are linear in the robot's parameters.
 
-use crate::residual::torques::{evaluated, of_the_robot, refusal, StateColumns};
+use crate::log_states::{named_rates, NamedRate};
+use crate::residual::torques::{evaluated, of_the_robot, StateColumns};
 use std::ops::Range;
 use straightline_codegen::compile::compile_programs;
 use straightline_codegen::diagnostic::{Diagnostics, Source};
 use straightline_codegen::function::base_parameter_lists;
 use straightline_codegen::options::Options;
 use straightline_codegen::Function;
+use straightline_core::algorithms::{integrate, passive_force};
 use straightline_core::base_parameters::{BaseParameter, JointParameter};
-use straightline_core::model::{JointEffects, Model};
+use straightline_core::model::{Coulomb, JointEffects, Model};
 use straightline_core::Dd;
 use straightline_graph::expr::Graph;
 use straightline_jit::{ExecutionMode, LoadError, Robot};
@@ -42,6 +44,12 @@ pub struct RegressorModel {
     pub names: Vec<String>,
     /// Their values by the robot file.
     pub nominal: Vec<f64>,
+    /// What its rates and forces are called.
+    pub rates: Vec<NamedRate>,
+    /// The robot in its scene in f64.
+    pub model: Model<f64>,
+    /// The same with nothing of joints that is among the parameters; `None` where nothing of joints is left.
+    other_effects: Option<Model<f64>>,
 }
 
 impl RegressorModel {
@@ -66,7 +74,19 @@ impl RegressorModel {
         let exact = robot.model().clone();
         let list = base_parameter_lists(&exact, &functions).into_iter().next();
         let (names, nominal) = list.map_or_else(Default::default, |list| (list.names, list.values));
-        Ok(RegressorModel { robot, graph, exact, kinds, names, nominal })
+        let model: Model<f64> = exact.cast();
+        let other_effects = Some(without(model.clone(), &kinds)).filter(has_effects);
+        Ok(RegressorModel {
+            robot,
+            graph,
+            rates: named_rates(&model),
+            exact,
+            kinds,
+            names,
+            nominal,
+            model,
+            other_effects,
+        })
     }
 
     /// What the compiler has to say of the robot file.
@@ -74,17 +94,9 @@ impl RegressorModel {
         self.robot.warnings()
     }
 
-    /// Why the robot cannot be identified by a log of its joints, if so.
+    /// Why the robot cannot be identified by logs, if so.
     pub fn refusal(&self) -> Option<String> {
-        let followers = self.exact.bodies.len() - self.exact.joints().len().min(self.exact.bodies.len());
-        refusal(&self.exact.cast())
-            .or_else(|| (followers > 0).then(|| "it has joints that follow others".to_string()))
-            .or_else(|| self.nominal.is_empty().then(|| "nothing of it moves".to_string()))
-    }
-
-    /// The names of the joints, in the order of the coordinates.
-    pub fn joints(&self) -> Vec<&str> {
-        self.exact.joints().iter().map(|joint| joint.name.as_str()).collect()
+        self.nominal.is_empty().then(|| "nothing of it moves".to_string())
     }
 
     /// The base parameters.
@@ -118,7 +130,7 @@ impl RegressorModel {
         let of_log = |(log, stride): (&AlignedLog, usize)| {
             let blocks = log.segments.iter().map(|segment| self.of_segment(log, segment, cutoff, stride * thinned));
             let blocks = blocks.filter(|block| !block.values.is_empty()).collect();
-            FitData { columns: self.nominal.len(), outputs: self.joints().len(), blocks }
+            FitData { columns: self.nominal.len(), outputs: self.rates.len(), blocks }
         };
         logs.iter().zip(strides).map(of_log).collect()
     }
@@ -148,7 +160,7 @@ impl RegressorModel {
         let cut =
             |columns: &StateColumns| -> StateColumns { columns.iter().map(|c| c[window.clone()].to_vec()).collect() };
         let (q, qd, times) = (cut(&log.q), cut(&log.qd), &log.times[window.clone()]);
-        let (columns, outputs) = (self.nominal.len(), q.len());
+        let (columns, outputs) = (self.nominal.len(), qd.len());
         let at = block.values.len();
         block.values.resize(at + picks.len() * outputs, 0.0);
         block.rows.resize((at + picks.len() * outputs) * columns, 0.0);
@@ -199,8 +211,8 @@ impl RegressorModel {
             (0..n).map(|i| MOVED / qd.iter().fold(1e-3, |most: f64, c| most.max(c[i].abs()))).collect();
         let mut sum = Vec::new();
         for (moved, weight) in [(-2.0, 1.0), (-1.0, -8.0), (1.0, 8.0), (2.0, -1.0)] {
-            let at: StateColumns =
-                q.iter().zip(qd).map(|(q, qd)| (0..n).map(|i| q[i] + moved * step[i] * qd[i]).collect()).collect();
+            let lengths: Vec<f64> = step.iter().map(|step| moved * step).collect();
+            let at = self.moved(q, qd, &lengths);
             let found = self.regressor(Function::MomentumRegressor, &[&at, qd], n);
             sum.resize(found.len(), 0.0);
             for (sum, found) in sum.chunks_exact_mut(n).zip(found.chunks_exact(n)) {
@@ -212,20 +224,51 @@ impl RegressorModel {
         sum
     }
 
+    /// Configurations along velocities, each by a time of its own.
+    fn moved(&self, q: &StateColumns, qd: &StateColumns, times: &[f64]) -> StateColumns {
+        if q.len() == qd.len() {
+            let along = |(q, qd): (&Vec<f64>, &Vec<f64>)| {
+                q.iter().zip(qd.iter().zip(times)).map(|(q, (qd, time))| q + time * qd).collect()
+            };
+            return q.iter().zip(qd).map(along).collect();
+        }
+        let mut at = vec![Vec::with_capacity(times.len()); q.len()];
+        for (i, time) in times.iter().enumerate() {
+            let of = |columns: &StateColumns, by: f64| columns.iter().map(|c| by * c[i]).collect::<Vec<f64>>();
+            let next = integrate(&self.model, &of(q, 1.0), &of(qd, *time));
+            at.iter_mut().zip(next).for_each(|(column, x)| column.push(x));
+        }
+        at
+    }
+
     /// What joints add without a column: springs.
     fn known_forces(&self, q: &StateColumns, qd: &StateColumns) -> StateColumns {
-        let bodies = self.exact.bodies_in_order().into_iter().map(|b| &self.exact.bodies[b]);
-        let of_joint = |(j, body): (usize, &straightline_core::model::Body<Dd>)| -> Vec<f64> {
-            let effects: JointEffects<f64> = body.effects.map(|x| x.to_f64());
-            let others = JointParameter::EVERY.into_iter().filter(|kind| !self.kinds.contains(kind));
-            let others: Vec<(JointParameter, f64)> =
-                others.map(|kind| (kind, kind.value(&body.effects).to_f64())).collect();
-            let force =
-                |i: usize| others.iter().map(|(kind, x)| x * kind.force(&effects, [q[j][i], qd[j][i], 0.0])).sum();
-            (0..q[j].len()).map(force).collect()
-        };
-        bodies.enumerate().map(of_joint).collect()
+        let count = qd.first().map_or(0, Vec::len);
+        let Some(model) = &self.other_effects else { return vec![vec![0.0; count]; qd.len()] };
+        let mut forces = vec![Vec::with_capacity(count); qd.len()];
+        for i in 0..count {
+            let at = |columns: &StateColumns| columns.iter().map(|c| c[i]).collect::<Vec<f64>>();
+            let found = passive_force(model, &at(q), &at(qd));
+            forces.iter_mut().zip(found).for_each(|(column, x)| column.push(x));
+        }
+        forces
     }
+}
+
+/// The robot whose joints lack what these parameters stand for. Damping of joints with several coordinates is no parameter.
+fn without(mut model: Model<f64>, kinds: &[JointParameter]) -> Model<f64> {
+    for body in model.bodies.iter_mut().filter(|body| body.joint.kind.is_single()) {
+        body.effects = kinds.iter().fold(body.effects, |effects, kind| effects.without(*kind));
+    }
+    model
+}
+
+/// Whether joints have friction or springs.
+fn has_effects(model: &Model<f64>) -> bool {
+    let has = |effects: &JointEffects<f64>| {
+        effects.damping != 0.0 || effects.stiffness != 0.0 || effects.coulomb != Coulomb::Off
+    };
+    model.bodies.iter().any(|body| has(&body.effects))
 }
 
 /// Every so many rows are fitted.

@@ -2,6 +2,7 @@
 
 use super::payload::{UnitPayloads, PAYLOAD_PARAMETERS};
 use super::ResidualTorques;
+use crate::log_states::NamedRate;
 use straightline_logs::align::AlignedLog;
 use straightline_logs::episodes::{episodes, robust_spread, Episode, EpisodeDemand};
 use straightline_logs::fit::{Fitted, LeastSquares};
@@ -29,8 +30,8 @@ pub struct JointFigure {
     pub rms: [f64; 2],
     /// Its mean, by inverse dynamics \[N·m or N\].
     pub bias: f64,
-    /// What was fitted, in the order of [`JOINT_PARAMETERS`], each with its standard error.
-    pub fitted: [(f64, f64); 3],
+    /// What was fitted, in the order of [`JOINT_PARAMETERS`], each with its standard error; nothing of joints with several coordinates.
+    pub fitted: Option<[(f64, f64); 3]>,
     /// The part of the mean square that the fit explains.
     pub explained: f64,
     /// When what is left is too far from its median for noise.
@@ -51,13 +52,13 @@ pub struct PayloadFigure {
 /// What explains residuals.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Explanation {
-    /// Per joint.
+    /// Per rate.
     pub joints: Vec<JointFigure>,
     /// At the frame, if one was asked for.
     pub payload: Option<PayloadFigure>,
-    /// Names of parameters that the data cannot tell from others, with the joint's index.
+    /// Names of parameters that the data cannot tell from others, with the rate's index.
     pub untold: Vec<(Option<usize>, &'static str)>,
-    /// Per joint what is left of measured minus model.
+    /// Per rate what is left of measured minus model.
     pub left: Vec<Vec<f64>>,
     /// Rows that were fitted.
     pub rows: usize,
@@ -97,11 +98,49 @@ fn signs(log: &AlignedLog, residuals: &ResidualTorques) -> Vec<Vec<f64>> {
 /// Torques of one unit of each parameter of the payload, per row and joint.
 type CarriedRows = Vec<Vec<[f64; 10]>>;
 
+/// Where parameters stand among the columns of a fit.
+struct FitColumns {
+    /// Those of the payload, in front.
+    payload: usize,
+    /// The first of those of each rate that has some of its own.
+    own: Vec<Option<usize>>,
+    /// All.
+    count: usize,
+}
+
+impl FitColumns {
+    fn of(log: &AlignedLog, residuals: &ResidualTorques, has_payload: bool) -> FitColumns {
+        let payload = if has_payload { CARRIED } else { 0 };
+        let mut count = payload;
+        let place = |(rate, is_measured): (&NamedRate, &bool)| {
+            let has_own = rate.is_single && *is_measured;
+            let first = count;
+            count += if has_own { OWN } else { 0 };
+            has_own.then_some(first)
+        };
+        let own = residuals.rates.iter().zip(&log.is_measured).map(place).collect();
+        FitColumns { payload, own, count }
+    }
+
+    /// Rates whose rows say something of what is fitted.
+    fn rates<'a>(&'a self, log: &'a AlignedLog) -> impl Iterator<Item = usize> + 'a {
+        (0..self.own.len()).filter(|j| log.is_measured[*j] && (self.payload > 0 || self.own[*j].is_some()))
+    }
+
+    /// The rate of a column, if it is not the payload's, and which parameter it is.
+    fn named(&self, column: usize) -> (Option<usize>, &'static str) {
+        let of = |place: &Option<usize>| place.is_some_and(|first| (first..first + OWN).contains(&column));
+        match self.own.iter().position(of) {
+            None => (None, PAYLOAD_PARAMETERS[column]),
+            Some(rate) => (Some(rate), JOINT_PARAMETERS[(column - self.payload) % OWN]),
+        }
+    }
+}
+
 /// A fit, and what it leaves.
 struct ExplainedFit {
     found: Fitted,
-    /// Columns of the payload in front.
-    offset: usize,
+    columns: FitColumns,
     payload: Option<PayloadFigure>,
     left: Vec<Vec<f64>>,
 }
@@ -129,13 +168,9 @@ pub fn explain(log: &AlignedLog, residuals: &ResidualTorques, payload: Option<&U
         }
         solved = solve(log, residuals, &signs, &rows, carried.as_ref());
     }
-    let ExplainedFit { found, offset, payload, left } = solved;
-    let joints = in_threads(qd.len(), |j| joint_figure(log, residuals, j, (&found, offset), &left[j]));
-    let named = |k: &usize| match k.checked_sub(offset) {
-        None => (None, PAYLOAD_PARAMETERS[*k]),
-        Some(own) => (Some(own / OWN), JOINT_PARAMETERS[own % OWN]),
-    };
-    let untold = found.untold.iter().map(named).collect();
+    let ExplainedFit { found, columns, payload, left } = solved;
+    let joints = in_threads(qd.len(), |j| joint_figure(log, residuals, j, (&found, &columns), &left[j]));
+    let untold = found.untold.iter().map(|k| columns.named(*k)).collect();
     Explanation { joints, payload, untold, left, rows: rows.len() }
 }
 
@@ -147,32 +182,39 @@ fn solve(
     rows: &[usize],
     carried: Option<&CarriedRows>,
 ) -> ExplainedFit {
-    let mut found = fitted(rows, residuals, signs, carried);
+    let mut columns = FitColumns::of(log, residuals, carried.is_some());
+    let mut found = fitted(log, residuals, &columns, (rows, carried), signs);
     let payload = carried.map(|_| payload_figure(&found));
     let used = carried.filter(|_| payload.as_ref().is_some_and(|figure| figure.is_found));
     if carried.is_some() && used.is_none() {
-        found = fitted(rows, residuals, signs, None);
+        columns = FitColumns::of(log, residuals, false);
+        found = fitted(log, residuals, &columns, (rows, None), signs);
     }
-    let offset = if used.is_some() { CARRIED } else { 0 };
-    let left = left_over(log, residuals, (rows, used), (&found.coefficients, offset), signs);
-    ExplainedFit { found, offset, payload, left }
+    let left = left_over(log, residuals, (rows, used), (&found.coefficients, &columns), signs);
+    ExplainedFit { found, columns, payload, left }
 }
 
 /// One fit of all joints: the columns of the payload, if any, then those of each joint.
-fn fitted(rows: &[usize], residuals: &ResidualTorques, signs: &[Vec<f64>], carried: Option<&CarriedRows>) -> Fitted {
-    let joints = residuals.direct.len();
-    let offset = if carried.is_some() { CARRIED } else { 0 };
+fn fitted(
+    log: &AlignedLog,
+    residuals: &ResidualTorques,
+    columns: &FitColumns,
+    (rows, carried): (&[usize], Option<&CarriedRows>),
+    signs: &[Vec<f64>],
+) -> Fitted {
     // joints are as noisy as they are strong: each counts in units of its own residual
-    let scales: Vec<f64> = in_threads(joints, |j| robust_spread(&residuals.direct[j]).1.max(1e-12));
-    let mut squares = LeastSquares::new(offset + OWN * joints);
-    let mut row = vec![0.0; offset + OWN * joints];
+    let scales: Vec<f64> = in_threads(residuals.direct.len(), |j| robust_spread(&residuals.direct[j]).1.max(1e-12));
+    let mut squares = LeastSquares::new(columns.count);
+    let mut row = vec![0.0; columns.count];
     for (n, i) in rows.iter().enumerate() {
-        for j in 0..joints {
+        for j in columns.rates(log) {
             row.fill(0.0);
             if let Some(carried) = carried {
                 row[..CARRIED].copy_from_slice(&carried[n][j]);
             }
-            row[offset + OWN * j..][..OWN].copy_from_slice(&[1.0, residuals.motion[1][j][*i], signs[j][*i]]);
+            if let Some(own) = columns.own[j] {
+                row[own..own + OWN].copy_from_slice(&[1.0, residuals.motion[1][j][*i], signs[j][*i]]);
+            }
             row.iter_mut().for_each(|x| *x /= scales[j]);
             squares.push(&row, residuals.direct[j][*i] / scales[j]);
         }
@@ -204,11 +246,11 @@ fn left_over(
     log: &AlignedLog,
     residuals: &ResidualTorques,
     (rows, carried): (&[usize], Option<&CarriedRows>),
-    (coefficients, offset): (&[f64], usize),
+    (coefficients, columns): (&[f64], &FitColumns),
     signs: &[Vec<f64>],
 ) -> Vec<Vec<f64>> {
     let of_joint = |j: usize| -> Vec<f64> {
-        let own = &coefficients[offset + OWN * j..][..OWN];
+        let own = columns.own[j].map_or(&[0.0; OWN][..], |own| &coefficients[own..own + OWN]);
         let torque = |n: usize| -> f64 {
             carried.map_or(0.0, |rows| rows[n][j].iter().zip(coefficients).map(|(y, x)| y * x).sum())
         };
@@ -238,7 +280,7 @@ fn joint_figure(
     log: &AlignedLog,
     residuals: &ResidualTorques,
     j: usize,
-    (found, offset): (&Fitted, usize),
+    (found, columns): (&Fitted, &FitColumns),
     left: &[f64],
 ) -> JointFigure {
     let direct = &residuals.direct[j];
@@ -246,10 +288,7 @@ fn joint_figure(
     JointFigure {
         rms: [all.sqrt(), square(&residuals.observed[j]).sqrt()],
         bias: direct.iter().sum::<f64>() / direct.len().max(1) as f64,
-        fitted: std::array::from_fn(|k| {
-            let k = offset + OWN * j + k;
-            (found.coefficients[k], found.errors[k])
-        }),
+        fitted: columns.own[j].map(|own| std::array::from_fn(|k| (found.coefficients[own + k], found.errors[own + k]))),
         explained: if all > 0.0 { 1.0 - rest / all } else { 0.0 },
         episodes: episodes_of(log, residuals, j, left),
     }
@@ -261,6 +300,10 @@ fn square(values: &[f64]) -> f64 {
 
 /// The episodes of a joint, but for those at ends, where smoothing has no neighbours.
 fn episodes_of(log: &AlignedLog, residuals: &ResidualTorques, j: usize, left: &[f64]) -> Vec<Episode> {
+    // where no force is measured all that is left is one
+    if !log.is_measured[j] {
+        return Vec::new();
+    }
     let spread = robust_spread(left);
     let least = LEAST_CONTACT * square(&log.tau[j]).sqrt().max(1e-6);
     let wave = residuals.cutoff.map_or(0.0, |cutoff| 1.0 / cutoff);

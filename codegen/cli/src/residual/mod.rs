@@ -11,6 +11,7 @@ pub mod torques;
 pub use explain::{explain, Explanation, JointFigure, PayloadFigure, JOINT_PARAMETERS};
 
 use self::torques::{StateColumns, TorqueModel};
+use crate::log_states::{named_rates, NamedRate};
 use straightline_logs::align::AlignedLog;
 use straightline_logs::observer::Observer;
 use straightline_logs::smooth::LowPass;
@@ -19,15 +20,17 @@ use straightline_logs::threads::in_threads;
 /// Residual torques of all rows of a log.
 #[derive(Clone, Debug)]
 pub struct ResidualTorques {
+    /// What they are called.
+    pub rates: Vec<NamedRate>,
     /// The cut-off of smoothing \[Hz\]; `None` where the log has accelerations and nothing is smoothed.
     pub cutoff: Option<f64>,
     /// The gain of the observer \[1/s\].
     pub gain: f64,
     /// Positions, velocities and accelerations that the model was given.
     pub motion: [StateColumns; 3],
-    /// Measured minus model by inverse dynamics \[N·m or N\], per joint.
+    /// Measured minus model by inverse dynamics \[N·m or N\], per rate; where no force is measured, minus what the surroundings exert.
     pub direct: StateColumns,
-    /// Measured minus model by the observer \[N·m or N\], per joint; it follows within 1/gain.
+    /// Measured minus model by the observer \[N·m or N\], per rate; it follows within 1/gain.
     pub observed: StateColumns,
 }
 
@@ -39,23 +42,37 @@ pub fn usual_cutoff(period: f64) -> f64 {
     }
 }
 
-/// Residual torques of a log whose joints stand in the order of the robot's.
+/// Residual torques of a log of whole states.
 pub fn residual_torques(model: &TorqueModel, log: &AlignedLog, cutoff: f64) -> ResidualTorques {
+    let rates = named_rates(&model.model);
     let gain = 2.0 * std::f64::consts::PI * cutoff;
     let (momentum, force) = momentum_and_force(model, log);
     let observed = observed(log, [&momentum, &force], Observer { gain });
     let Some(qdd) = &log.qdd else {
         let filter = LowPass { cutoff };
-        let ((q, _), (qd, qdd)) = (smoothed(log, &log.q, filter), smoothed(log, &log.qd, filter));
+        let ((mut q, _), (qd, qdd)) = (smoothed(log, &log.q, filter), smoothed(log, &log.qd, filter));
+        normalise(model, &mut q);
         // LP τ − LP (d/dt p − f): what is smoothed is linear in what is measured, so that a fast motion leaves nothing behind
         let ((mut direct, _), (_, growth)) = (smoothed(log, &force, filter), smoothed(log, &momentum, filter));
         subtract(&mut direct, &growth);
-        return ResidualTorques { cutoff: Some(cutoff), gain, motion: [q, qd, qdd], direct, observed };
+        return ResidualTorques { rates, cutoff: Some(cutoff), gain, motion: [q, qd, qdd], direct, observed };
     };
     let motion = [log.q.clone(), log.qd.clone(), qdd.clone()];
     let mut direct = log.tau.clone();
     subtract(&mut direct, &model.inverse_dynamics([&motion[0], &motion[1], &motion[2]]));
-    ResidualTorques { cutoff: None, gain, motion, direct, observed }
+    ResidualTorques { rates, cutoff: None, gain, motion, direct, observed }
+}
+
+/// Brings quaternions back to length one.
+fn normalise(model: &TorqueModel, q: &mut StateColumns) {
+    for joint in model.model.free_joints().filter(|joint| joint.kind.row().quaternion.is_some()) {
+        let own = &mut q[joint.iq..joint.iq + joint.kind.nq()];
+        for i in 0..own[0].len() {
+            let mut now: Vec<f64> = own.iter().map(|column| column[i]).collect();
+            joint.kind.normalise(&mut now);
+            own.iter_mut().zip(now).for_each(|(column, x)| column[i] = x);
+        }
+    }
 }
 
 fn subtract(from: &mut StateColumns, what: &StateColumns) {

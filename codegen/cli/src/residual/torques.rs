@@ -46,16 +46,6 @@ impl TorqueModel {
         self.robot.warnings()
     }
 
-    /// Why the robot has no residuals by a log of its joints, if so.
-    pub fn refusal(&self) -> Option<String> {
-        refusal(&self.model)
-    }
-
-    /// The names of the joints, in the order of the coordinates.
-    pub fn joints(&self) -> Vec<&str> {
-        self.model.joints().iter().map(|joint| joint.name.as_str()).collect()
-    }
-
     /// Torques of a motion \[N·m or N\]: H q̈ + h.
     pub fn inverse_dynamics(&self, motion: [&StateColumns; 3]) -> StateColumns {
         self.over_states("inverse_dynamics", &motion, |_, found| found.to_vec())
@@ -137,18 +127,6 @@ pub(crate) fn of_the_robot(options: &Options, functions: Vec<Function>) -> Optio
     options.scene.zero = Zero::default();
     options.scene.staged = false;
     options
-}
-
-/// Why a log of joints says nothing of a robot's forces, if so.
-pub(crate) fn refusal(model: &Model<f64>) -> Option<String> {
-    if model.floats() {
-        return Some("its base floats: a log of joints does not say how it moves".to_string());
-    }
-    if !model.closure.is_empty() {
-        return Some("it has closed loops".to_string());
-    }
-    let other = model.joints().into_iter().find(|joint| !joint.kind.is_single())?;
-    Some(format!("joint `{}` has several coordinates, of which messages have no place", other.name))
 }
 
 /// The results of a function for some states, entry after entry.

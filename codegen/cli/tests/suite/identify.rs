@@ -1,6 +1,6 @@
 //! The command `identify`: equations are exact, intervals hold, what is written can be and is the robot, and what logs cannot tell stays.
 
-use crate::logged::{self, csv, logged, motion, straightline, Normal};
+use crate::logged::{self, aligned, csv, logged, motion, straightline, Normal};
 use std::fs;
 use std::path::PathBuf;
 use straightline_cli::identification::{
@@ -14,9 +14,7 @@ use straightline_codegen::options::Options;
 use straightline_core::base_parameters::JointParameter;
 use straightline_core::model::Model;
 use straightline_graph::Scalar;
-use straightline_logs::align::{align, AlignedLog};
 use straightline_logs::consistent::is_body;
-use straightline_logs::log::from_columns;
 
 const ROBOTS: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../../robots/descriptions");
 
@@ -79,10 +77,6 @@ fn times(seconds: f64, rate: f64, from: f64) -> Vec<f64> {
     (0..(seconds * rate) as usize).map(|i| from + i as f64 / rate).collect()
 }
 
-fn aligned(columns: Vec<(String, Vec<f64>)>, joints: &[&str]) -> AlignedLog {
-    align(&from_columns(columns).expect("a log"), joints).expect("all joints are there")
-}
-
 /// Noise on torques \[N·m\] and velocities \[rad/s\], encoders of 1e-5 rad; without accelerations.
 fn as_measured(columns: &mut Vec<(String, Vec<f64>)>, noise: &mut Normal, [tau, qd]: [f64; 2]) {
     columns.retain(|(name, _)| !name.starts_with("qdd."));
@@ -116,7 +110,7 @@ fn a_scene_in_single_precision_is_identified_in_double() {
     let (single, double) =
         (RegressorModel::load(&source, &options), RegressorModel::load(&source, &Options::default()));
     let (single, double) = (single.expect("the robot can be loaded"), double.expect("the robot can be loaded"));
-    let log = aligned(logged(&double.exact.cast(), &times(0.2, 500.0, 0.0)), &double.joints());
+    let log = aligned(logged(&double.exact.cast(), &times(0.2, 500.0, 0.0)), &double.model);
     assert_eq!(single.equations(std::slice::from_ref(&log), 10.0), double.equations(&[log], 10.0));
 }
 
@@ -127,7 +121,7 @@ fn regressor_times_parameters_is_the_torque() {
         let (robot, _) = loaded(&source);
         let model = robot.exact.cast::<f64>();
         let columns = logged(&model, &times(1.0, 500.0, 0.0));
-        let log = aligned(columns.clone(), &robot.joints());
+        let log = aligned(columns.clone(), &robot.model);
         let data = together(&robot.equations(&[log], 10.0));
         let zero = vec![0.0; robot.nominal.len()];
         assert_eq!(data.instants(), 500);
@@ -136,7 +130,7 @@ fn regressor_times_parameters_is_the_torque() {
         }
         // without accelerations the equations are as exact as a quartic's slope between samples
         let without = columns.into_iter().filter(|(name, _)| !name.starts_with("qdd.")).collect();
-        let log = aligned(without, &robot.joints());
+        let log = aligned(without, &robot.model);
         let data = together(&robot.equations(&[log], 10.0));
         for (left, all) in data.rms(&robot.nominal).iter().zip(data.rms(&zero)) {
             assert!(*left < 1e-6 * (1e-2 + all), "{file}: {left} of {all} without accelerations");
@@ -152,7 +146,7 @@ fn numbers_of_a_noisy_panda_are_found_with_their_intervals() {
     let mut noise = Normal(3);
     let mut columns = logged(&truth, &times(60.0, 500.0, 0.0));
     as_measured(&mut columns, &mut noise, [0.1, 2e-3]);
-    let data = together(&robot.equations(&[aligned(columns, &robot.joints())], 5.0));
+    let data = together(&robot.equations(&[aligned(columns, &robot.model)], 5.0));
     let found = identified(&robot, &map, &data).expect("links can be");
 
     let (true_robot, _) = loaded(&truth_source);
@@ -174,7 +168,7 @@ fn numbers_of_a_noisy_panda_are_found_with_their_intervals() {
     // all links can be, and the file with them predicts another motion to little more than noise
     assert!(found.bodies.iter().all(is_body));
     let mut said = Diagnostics::new();
-    let text = renumbered(&source, &found.numbers(&robot, &map), &mut said).unwrap_or_else(|| panic!("{said}"));
+    let text = renumbered(&source, &found.numbers(&map), &mut said).unwrap_or_else(|| panic!("{said}"));
     let (written, _) = loaded(&Source::new("written.urdf", text));
     for (a, b) in written.nominal.iter().zip(&found.written) {
         // offsets have no place in a file
@@ -182,7 +176,7 @@ fn numbers_of_a_noisy_panda_are_found_with_their_intervals() {
     }
     let mut other = logged(&truth, &times(20.0, 500.0, 100.0));
     other.retain(|(name, _)| !name.starts_with("qdd."));
-    let other = together(&robot.equations(&[aligned(other, &robot.joints())], 5.0));
+    let other = together(&robot.equations(&[aligned(other, &robot.model)], 5.0));
     let (by_file, by_written) = (other.rms(&robot.nominal), other.rms(&written.nominal));
     for (j, (file, written)) in by_file.iter().zip(&by_written).enumerate() {
         assert!(*written < 0.05 && 8.0 * written < *file, "joint {j}: {file} {written}");
@@ -201,7 +195,7 @@ fn coverage(runs: usize) -> Vec<f64> {
     for _ in 0..runs {
         let mut columns = exact.clone();
         as_measured(&mut columns, &mut noise, [0.05, 1e-3]);
-        let data = together(&robot.equations(&[aligned(columns, &robot.joints())], 5.0));
+        let data = together(&robot.equations(&[aligned(columns, &robot.model)], 5.0));
         let fit = data.fit(lags());
         for (k, wanted) in wanted.iter().enumerate() {
             inside[k] += usize::from((fit.fitted.coefficients[k] - wanted).abs() < 1.96 * fit.fitted.errors[k]);
@@ -237,7 +231,7 @@ fn a_log_that_stands_still_tells_little_and_changes_little() {
     // one joint swings, the others stand
     let times = times(10.0, 200.0, 0.0);
     let mut columns = logged(&truth, &times);
-    let joints = robot.joints().len();
+    let joints = robot.rates.len();
     for (k, t) in times.iter().enumerate() {
         let states: Vec<[f64; 3]> =
             (0..joints).map(|j| if j == 3 { motion(j, *t) } else { [motion(j, 0.0)[0], 0.0, 0.0] }).collect();
@@ -247,7 +241,7 @@ fn a_log_that_stands_still_tells_little_and_changes_little() {
             columns[1 + j].1[k] = x;
         }
     }
-    let data = together(&robot.equations(&[aligned(columns, &robot.joints())], 10.0));
+    let data = together(&robot.equations(&[aligned(columns, &robot.model)], 10.0));
     let found = identified(&robot, &map, &data).expect("links can be");
     assert!(found.fit.fitted.untold.len() > 20, "{:?}", found.fit.fitted.untold);
     assert!(found.bodies.iter().all(is_body));
@@ -305,7 +299,7 @@ fn the_command_writes_the_file_and_says_what_it_cannot_tell() {
     }
     for (arguments, parts) in [
         (&["identify", source.path(), &short][..], &["short.csv: too short", "--cutoff"][..]),
-        (&["identify", source.path(), &one, "--floating-base"], &["cannot be identified by logs: its base floats"]),
+        (&["identify", source.path(), &one, "--floating-base"], &["joint `root_joint.qx` is not in the log"]),
     ] {
         let output = straightline(arguments);
         let said = String::from_utf8(output.stderr).expect("text");
@@ -325,10 +319,10 @@ fn rotors_are_found_where_the_file_has_some() {
     assert!(robot.kinds.contains(&JointParameter::RotorInertia));
     let (model, _) = load(&truth, &ModelOptions::default());
     let columns = logged(&model.expect("a robot").cast(), &times(5.0, 250.0, 0.0));
-    let data = together(&robot.equations(&[aligned(columns, &robot.joints())], 10.0));
+    let data = together(&robot.equations(&[aligned(columns, &robot.model)], 10.0));
     let found = identified(&robot, &map, &data).expect("links can be");
     let mut said = Diagnostics::new();
-    let written = renumbered(&source, &found.numbers(&robot, &map), &mut said).unwrap_or_else(|| panic!("{said}"));
+    let written = renumbered(&source, &found.numbers(&map), &mut said).unwrap_or_else(|| panic!("{said}"));
     let robot = description_of(&Source::new("written.toml", written));
     // that of the second joint is told apart from the inertia of its link, that of the first is not
     let second = robot.joint("joint2").and_then(|joint| joint.drive.rotor_inertia.clone()).expect("it is there");
@@ -390,4 +384,61 @@ fn the_command_writes_a_motion_that_can_be_analysed() {
     let analysed = straightline(&["analyze", source.path(), "--motion", &path]);
     assert!(analysed.status.success(), "{}", String::from_utf8_lossy(&analysed.stderr));
     assert_eq!(straightline(&["identify", source.path()]).status.code(), Some(2));
+}
+
+/// Weight and a rotor that slides up and down cannot be told from an offset: they are what a file has a place for.
+#[test]
+fn weight_is_no_offset() {
+    let text = "[robot]\nname = \"lift\"\n[[link]]\nname = \"base\"\n[[link]]\nname = \"car\"\nmass = 2.0\ninertia = [0.01, 0.01, 0.01]\n\
+                [[joint]]\nname = \"z\"\nkind = \"prismatic\"\nparent = \"base\"\nchild = \"car\"\naxis = \"z\"\narmature = 0.5\n";
+    let (robot, map) = loaded(&Source::new("lift.toml", text));
+    for (mass, rotor) in [(2.0, 0.9), (3.0, 0.5), (2.5, 0.7)] {
+        let (model, _) = load(
+            &Source::new(
+                "truth.toml",
+                text.replace("2.0", &format!("{mass:?}")).replace("armature = 0.5", &format!("armature = {rotor:?}")),
+            ),
+            &ModelOptions::default(),
+        );
+        let columns = logged(&model.expect("a robot").cast(), &times(5.0, 100.0, 0.0));
+        let data = together(&robot.equations(&[aligned(columns, &robot.model)], 5.0));
+        let found = identified(&robot, &map, &data).expect("links can be");
+        let sizes = data.rms(&vec![0.0; data.columns]);
+        for (left, size) in data.rms(&found.written).iter().zip(sizes) {
+            assert!(
+                *left < 0.02 * size,
+                "mass {mass}, rotor {rotor}: {left} of {size} are left by what is written: {:?} {:?}",
+                found.bodies,
+                found.joints
+            );
+        }
+    }
+}
+
+/// A joint without a drive, whose effort is zero all the time, tells as much as the others.
+#[test]
+fn a_joint_without_force_hides_nothing() {
+    let source = source_of("planar2r.urdf");
+    let (robot, map) = loaded(&source);
+    let (_, truth) = in_truth(&source, |_| [0.0, 0.0]);
+    // by forward dynamics, with a force on the first joint alone
+    let (mut q, mut qd, h) = (vec![0.4, -0.2], vec![0.0, 0.0], 1e-3);
+    let mut columns = logged(&truth, &times(4.0, 1000.0, 0.0));
+    for i in 0..4000 {
+        let tau = [3.0 * (5e-3 * i as f64).sin(), 0.0];
+        let qdd = straightline_core::algorithms::forward_dynamics_aba(&truth, &q, &qd, &tau);
+        for (k, x) in [&q[..], &qd, &qdd, &tau].concat().into_iter().enumerate() {
+            columns[1 + k].1[i] = x;
+        }
+        for k in 0..2 {
+            qd[k] += h * qdd[k];
+            q[k] += h * qd[k];
+        }
+    }
+    let data = together(&robot.equations(&[aligned(columns, &robot.model)], 5.0));
+    let found = identified(&robot, &map, &data).expect("links can be");
+    assert!(found.fit.fitted.errors.iter().filter(|error| error.is_finite()).count() > 4, "{:?}", found.fit.fitted);
+    for (left, by_file) in data.rms(&found.written).iter().zip(data.rms(&robot.nominal)) {
+        assert!(*left < 1e-2 * by_file + 1e-6, "{left}, {by_file} by the file");
+    }
 }

@@ -29,3 +29,5 @@ mod report;
 mod residuals;
 mod simulation;
 mod view;
+#[cfg(feature = "logs")]
+mod whole_states;

@@ -281,7 +281,7 @@ fn everything_that_is_wrong_has_its_place() {
         ("a.csv", "t,joint2\n0,1\n1,x\n", "a.csv:3", "`x`"),
         ("a.csv", "time,joint2\n0,1\n", "a.csv:1", "`t`"),
         ("a.csv", "t,joint2x\n0,1\n1,2\n", "a.csv:1", "joint2x"),
-        ("a.csv", "t,joint2\n1,1\n0,2\n", "a.csv:1", "does not come after"),
+        ("a.csv", "t,joint2\n1,1\n0,2\n", "a.csv:3", "does not come after"),
         ("a.csv", "t,joint2\n0,1,2\n", "a.csv:2", "samples cannot be read"),
         ("a.json", "{\"t\": [0, 1], \"joint2\": [1]}", "a.json:1", "the first array 1"),
         ("a.json", "{\"t\": [0, 1],\n \"joint2\"}", "a.json:2", "samples cannot be read"),
@@ -703,4 +703,42 @@ fn robots_with_closed_loops_swing_with_their_energy() {
     let motion = write(&here, "motion.csv", "t,crank,coupler,rocker\n0,0,0,0\n0.5,0,0,0\n1,0,0,0\n");
     let said = fails(&["analyze", &robot, "--motion", &motion]);
     assert!(said.contains("error[determined-moving]") && said.contains("joint `coupler`"), "{said}");
+}
+
+/// A joint that begins beyond its range does not leave it; the others do, and end the simulation.
+#[test]
+fn each_joint_has_a_limit_of_its_own() {
+    let folder = scratch("limits");
+    let joint = |name: &str, parent: &str, child: &str| {
+        format!(
+            "[[link]]\nname = \"{child}\"\nmass = 1.0\ninertia = [0.1, 0.1, 0.1]\n[[joint]]\nname = \"{name}\"\nkind = \"revolute\"\n\
+             parent = \"{parent}\"\nchild = \"{child}\"\naxis = \"z\"\nlimits = {{ lower = -2.0, upper = 2.0 }}\n"
+        )
+    };
+    let text = format!(
+        "[robot]\nname = \"arm\"\n[[link]]\nname = \"base\"\n{}{}",
+        joint("j1", "base", "a"),
+        joint("j2", "base", "b")
+    );
+    let robot = write(&folder, "arm.toml", &text);
+    let start = "[simulation]\nduration = 2.0\n[start]\nq = [5.0, 1.9]\nqd = [0.0, 3.0]\n";
+    let [experiment, output] = [write(&folder, "start.toml", start), folder.join("run.csv").display().to_string()];
+    succeeds(&["simulate", &robot, "--input", &experiment, "-o", &output]);
+    let run = fs::read_to_string(&output).unwrap();
+    let last: Vec<f64> = run.lines().last().unwrap().split(',').map(|x| x.parse().unwrap()).collect();
+    assert!((last[0] - 0.1 / 3.0).abs() < 1e-9 && (last[2] - 2.0).abs() < 1e-9, "{last:?}");
+}
+
+#[test]
+fn rows_and_columns_of_samples_that_are_wrong_have_their_places() {
+    let folder = scratch("samples");
+    let robot = format!("{ROBOTS}/descriptions/planar_2r.toml");
+    for (text, parts) in [
+        ("t,joint1\n0,1\n0.2,1\n0.1,1\n", &["time-goes-back", "samples.csv:4:1"][..]),
+        ("t,joint1,joint1\n0,1,2\n", &["two columns are called `joint1`"]),
+    ] {
+        let samples = write(&folder, "samples.csv", text);
+        let said = fails(&["simulate", &robot, "--input", &samples]);
+        assert!(parts.iter().all(|part| said.contains(part)), "{said}");
+    }
 }
