@@ -8,6 +8,9 @@ use straightline_logs::mcap::LoggedPose;
 use straightline_logs::LogError;
 use straightline_view::ViewedPose;
 
+/// Position and quaternion, and linear and angular velocity.
+type PoseAndTwist = ([f64; 7], Option<[f64; 6]>);
+
 /// A pose of the base, and its velocity where the message has one, in the base's own axes.
 struct BaseState {
     time: f64,
@@ -66,7 +69,7 @@ pub fn add_base(log: &mut JointLog, base: &Joint, model: &Model<f64>, poses: &[L
         .filter(|pose| (&pose.topic[..], &pose.parent[..], &pose.child[..]) == (chosen.1, chosen.2, chosen.3));
     let states: Vec<BaseState> = own.filter_map(|pose| Some(state(base, pose, carried(&pose)?, log.start))).collect();
     let states = in_order(states);
-    let rows: Vec<Option<([f64; 7], Option<[f64; 6]>)>> = between(&states, &log.times);
+    let rows = between(&states, &log.times);
     let velocities = states.iter().all(|state| state.twist.is_some()).then_some(LogQuantity::Velocity);
     let position = |k: usize| rows.iter().map(|row| row.map_or(f64::NAN, |(pose, _)| pose[k])).collect::<Vec<f64>>();
     let velocity =
@@ -119,7 +122,7 @@ fn in_order(mut states: Vec<BaseState>) -> Vec<BaseState> {
 }
 
 /// Pose and twist at other times, by straight lines.
-fn between(states: &[BaseState], times: &[f64]) -> Vec<Option<([f64; 7], Option<[f64; 6]>)>> {
+fn between(states: &[BaseState], times: &[f64]) -> Vec<Option<PoseAndTwist>> {
     let mut steps: Vec<f64> = states.windows(2).map(|pair| pair[1].time - pair[0].time).collect();
     steps.sort_by(f64::total_cmp);
     let longest = GAP * steps.get(steps.len() / 2).copied().unwrap_or(0.0);

@@ -11,7 +11,8 @@ use similar::TextDiff;
 use std::io::Write;
 use std::path::{Path, PathBuf};
 use straightline_cli::identification::{
-    designed, fitted, identified, together, DesignDemand, Identification, IdentifiedJoint, LinkMap, RegressorModel,
+    designed, fitted, identified, new_inertial, together, DesignDemand, Identification, IdentifiedJoint, LinkMap,
+    RegressorModel,
 };
 use straightline_cli::log_states::NamedRate;
 use straightline_cli::residual::usual_cutoff;
@@ -314,7 +315,7 @@ impl IdentifyFindings<'_> {
 
     fn link_rows(&self) -> Vec<Vec<String>> {
         let row = |(link, body): (&straightline_cli::identification::IdentifiedLink, &[f64; PER_BODY])| {
-            let centre = [1, 2, 3].map(|k| four_digits(body[k] / body[0])).join(", ");
+            let centre = new_inertial(&link.name, body).com.map(four_digits).join(", ");
             vec![link.name.clone(), four_digits(link.written[0]), four_digits(body[0]), centre]
         };
         self.map.links.iter().zip(&self.found.bodies).map(row).collect()

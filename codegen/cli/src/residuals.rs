@@ -164,7 +164,7 @@ impl Findings<'_> {
         // with the motion, so that pages can draw it
         let rates = &self.residuals.rates;
         let forces: Vec<String> = rates.iter().map(|rate| rate.effort.clone()).collect();
-        let kinds: [(&str, Vec<String>, &Vec<Vec<f64>>); 6] = [
+        let kinds = [
             ("q", position_names(&self.model.model), &self.log.q),
             ("qd", rates.iter().map(|rate| rate.velocity.clone()).collect(), &self.log.qd),
             ("tau", forces.clone(), &self.log.tau),
@@ -172,7 +172,7 @@ impl Findings<'_> {
             ("observer", forces.clone(), &self.residuals.observed),
             ("unexplained", forces, &self.explanation.left),
         ];
-        let named = |(kind, names, _): &(&str, Vec<String>, _)| {
+        let named = |(kind, names, _): &(&str, Vec<String>, &Vec<Vec<f64>>)| {
             names.iter().map(|name| format!("{kind}.{name}")).collect::<Vec<_>>()
         };
         let names = std::iter::once("t".to_string()).chain(kinds.iter().flat_map(named)).collect();

@@ -176,7 +176,7 @@ impl Check<'_> {
                 break;
             }
             for name in [Quantity::Force, Quantity::Velocity].map(Quantity::name) {
-                state.get_mut(&name).into_iter().flatten().for_each(|x| *x = *x * Dd::from(GENTLE));
+                state.get_mut(&name).into_iter().flatten().for_each(|x| *x *= Dd::from(GENTLE));
             }
             found = evaluate(self.graph, &inputs(self.graph, &state));
         }

@@ -91,7 +91,7 @@ fn states_are_made_whole() {
     let base = &model.model.joints()[0].name.clone();
     let mut turned = columns.clone();
     for (name, column) in turned.iter_mut().filter(|(name, _)| name.contains(".q") && !name.starts_with("qd")) {
-        column.iter_mut().enumerate().for_each(|(i, x)| *x *= if i % 3 == 0 { -1.5 } else { 0.5 });
+        column.iter_mut().enumerate().for_each(|(i, x)| *x *= if i.is_multiple_of(3) { -1.5 } else { 0.5 });
         assert!(name.starts_with("q."), "{name}");
     }
     let found = aligned(turned, &model.model);
@@ -149,7 +149,7 @@ fn a_base_is_found_in_messages_of_poses() {
             parent: "odom".to_string(),
             child: "imu".to_string(),
             translation: position,
-            rotation: if i % 2 == 0 { turn } else { turn.map(|x| -x) },
+            rotation: if i.is_multiple_of(2) { turn } else { turn.map(|x| -x) },
             twist: with_twist.then_some(twist),
         }
     };
