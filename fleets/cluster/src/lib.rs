@@ -70,11 +70,13 @@ pub async fn session(scheduler: &str, config: SessionConfig) -> Result<SessionCo
 /// Gives all functions to a session, with robots and experiments from that folder.
 pub fn register(context: &SessionContext, folder: &RobotFolder) {
     straightline_fleets::register(context, folder);
+    straightline_sweeps::register(context, folder);
 }
 
 /// The functions that plans name.
 fn scalar_functions() -> impl Iterator<Item = ScalarUDF> {
-    straightline_fleets::scalar_functions(&RobotFolder::none()).into_iter()
+    let of_rows = straightline_fleets::scalar_functions(&RobotFolder::none());
+    of_rows.into_iter().chain(straightline_sweeps::scalar_functions())
 }
 
 /// A session of the scheduler, which knows the functions by name.

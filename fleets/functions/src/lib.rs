@@ -28,7 +28,7 @@ mod robot;
 mod states;
 pub mod text;
 
-pub use robot::{programs_kept, written_hash};
+pub use robot::{programs_kept, robot_literal, written_hash};
 pub use text::RobotFolder;
 
 use datafusion::logical_expr::{AggregateUDF, ScalarUDF};

@@ -101,6 +101,14 @@ pub fn carried(function: &str, literal: &ScalarValue, folder: &RobotFolder, of: 
     }
 }
 
+/// What the plan of a table carries of a robot that a query names: its text, found sound.
+///
+/// # Errors
+/// As [`carried`].
+pub fn robot_literal(table: &str, name: &str, folder: &RobotFolder) -> Result<ScalarValue> {
+    carried(table, &ScalarValue::from(name), folder, RobotUse::Joints)
+}
+
 /// The robot of a literal, whether or not planning was there before.
 ///
 /// # Errors

@@ -7,7 +7,7 @@ use std::path::PathBuf;
 ///
 /// Files that are named behind the query are the table `logs`. Functions: inverse_dynamics(robot, q, qd, qdd), forward_dynamics(robot, q, qd, tau), gravity_force(robot, q),
 /// bias_force(robot, q, qd), residual(robot, q, qd, qdd, effort), torque_limits_exceeded(robot, tau), regressor_normal_equations(robot, q, qd, qdd, effort) and
-/// identified_parameters(equations). A robot is the path of its file, 'panda.urdf' or 'panda.urdf#sha256:…'.
+/// identified_parameters(equations); the table sweep(robot, experiment, ranges, samples, seed). A robot is the path of its file, 'panda.urdf' or 'panda.urdf#sha256:…'.
 #[derive(Clone, Debug, Parser)]
 #[command(name = "straightline-query", version)]
 pub struct QueryArguments {

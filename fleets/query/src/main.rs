@@ -60,6 +60,7 @@ async fn query(arguments: &QueryArguments) -> Result<()> {
     let context = session(arguments).await?;
     let folder = RobotFolder::at(&arguments.robots);
     straightline_fleets::register(&context, &folder);
+    straightline_sweeps::register(&context, &folder);
     let mut tables = arguments.tables.clone();
     if !arguments.logs.is_empty() {
         tables.push((TABLE.to_string(), arguments.logs.clone()));

@@ -65,6 +65,7 @@ fn bits(table: &RecordBatch) -> Vec<(u32, Vec<u64>)> {
     keys.into_iter().zip(straightline_fleet_testing::query::bits(table, "r")).collect()
 }
 
+const SWEEP: &str = "SELECT * FROM sweep('descriptions/panda.urdf', 'experiments/panda_reach.toml', 'panda_link7.mass=0.5:3', 50, 7) ORDER BY sample";
 const RESIDUALS: &str = "SELECT id, residual('descriptions/ur5.urdf', q, qd, qdd, effort) AS r FROM logs ORDER BY id";
 
 #[test]
@@ -76,11 +77,14 @@ fn rows_are_those_of_one_process_for_any_number_of_executors() {
     let equations =
         "SELECT regressor_normal_equations('descriptions/ur5.urdf', q, qd, qdd, effort) AS n FROM logs WHERE id % 10 = 0";
     let sums = embedded(&logs, equations);
+    let sweep = embedded(&logs, SWEEP);
+    assert_eq!(sweep.num_rows(), 50);
     for executors in [1, 2] {
         let cluster = cluster(executors, 1, 60, folder.path());
         assert_eq!(bits(&distributed(&cluster.url, &logs, RESIDUALS, || ()).unwrap()), wanted, "{executors} executors");
         let found = distributed(&cluster.url, &logs, equations, || ()).unwrap();
         assert_eq!(found.column(0), sums.column(0), "{executors} executors");
+        assert_eq!(distributed(&cluster.url, &logs, SWEEP, || ()).unwrap(), sweep, "{executors} executors");
     }
 }
 

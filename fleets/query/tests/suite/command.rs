@@ -120,6 +120,17 @@ fn what_is_wrong_is_said_once_without_the_names_of_rules() {
     assert!(stderr.starts_with("error") && stderr.contains("--> arm.toml:2:"), "{stderr}");
 }
 
+#[test]
+fn a_sweep_is_a_table_of_its_own() {
+    let folder = tempfile::tempdir().unwrap();
+    let experiment = robots().join("../experiments/panda_reach.toml");
+    let sql = format!(
+        "SELECT count(*) AS n, count(why) AS wrong FROM sweep('panda.urdf', '{}', 'panda_link7.mass=0.5:3', 20, 7)",
+        experiment.display()
+    );
+    assert_eq!(said(folder.path(), &["--format", "csv", &sql]), "n,wrong\n20,0\n");
+}
+
 /// A scheduler and an executor in threads of the test: where they listen.
 #[cfg(feature = "cluster")]
 fn cluster(folder: &Path) -> String {

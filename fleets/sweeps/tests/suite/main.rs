@@ -1,0 +1,3 @@
+//! Tests of sweeps, in one binary.
+
+mod sweeps;
