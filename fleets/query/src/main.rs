@@ -41,7 +41,9 @@ fn main() -> ExitCode {
 }
 
 fn failed(text: &str) -> ExitCode {
-    eprintln!("error: {}", text.strip_prefix("error: ").unwrap_or(text));
+    // the compiler's messages say so themselves, with a code
+    let is_said = ["error:", "error["].iter().any(|head| text.starts_with(head));
+    eprintln!("{}{text}", if is_said { "" } else { "error: " });
     ExitCode::FAILURE
 }
 

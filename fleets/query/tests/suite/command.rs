@@ -117,7 +117,7 @@ fn what_is_wrong_is_said_once_without_the_names_of_rules() {
         .output()
         .unwrap();
     let stderr = text(&broken.stderr);
-    assert!(stderr.starts_with("error") && stderr.contains("--> arm.toml:2:"), "{stderr}");
+    assert!(stderr.starts_with("error[") && stderr.contains("--> arm.toml:2:"), "{stderr}");
 }
 
 #[test]
