@@ -37,15 +37,11 @@ pub fn no_base(base: &Joint) -> LogError {
 /// # Errors
 /// Several topics have poses of links that the base carries.
 pub fn add_base(log: &mut JointLog, base: &Joint, model: &Model<f64>, poses: &[LoggedPose]) -> Result<bool, LogError> {
-    let carried = |pose: &&LoggedPose| {
-        let frame = model.frame(&pose.child)?;
-        let body = &model.bodies[frame.body?];
-        body.joint.kind.is_base().then_some(&frame.placement)
-    };
-    let mut topics: Vec<(bool, &str, &str, &str)> = poses
+    let carried = |pose: &&LoggedPose| placement(model, pose);
+    let mut topics: Vec<(bool, &str, &str)> = poses
         .iter()
         .filter(|pose| carried(pose).is_some())
-        .map(|pose| (pose.twist.is_none(), &pose.topic[..], &pose.parent[..], &pose.child[..]))
+        .map(|pose| (pose.twist.is_none(), &pose.topic[..], &pose.parent[..]))
         .collect();
     topics.sort_unstable();
     topics.dedup();
@@ -54,19 +50,22 @@ pub fn add_base(log: &mut JointLog, base: &Joint, model: &Model<f64>, poses: &[L
         let best = topics.first().map(|topic| topic.0);
         move |topic| Some(topic.0) == best
     });
-    let chosen = match topics[..] {
-        [topic] => topic,
+    let (topic, parent) = match topics[..] {
+        [(_, topic, parent)] => (topic.to_string(), parent),
         [] => return Ok(false),
         _ => {
-            let named = |(_, topic, parent, child): &(bool, &str, &str, &str)| format!("{topic} ({child} in {parent})");
+            let named = |(_, topic, parent): &(bool, &str, &str)| format!("{topic} (in {parent})");
             let all: Vec<String> = topics.iter().map(named).collect();
             let what = format!("several topics say how the base {} moves: {}", base.name, all.join(", "));
             return Err(LogError::new("", what, "leave all but one out of the file"));
         }
     };
-    let own = poses
-        .iter()
-        .filter(|pose| (&pose.topic[..], &pose.parent[..], &pose.child[..]) == (chosen.1, chosen.2, chosen.3));
+    let of_topic = || poses.iter().filter(|pose| pose.topic == topic && pose.parent == parent);
+    // of several links of the base the one that it is named by, or whichever: they say the same
+    let is_root = |pose: &&LoggedPose| carried(pose).is_some_and(|place| *place == Transform::identity());
+    let links = || of_topic().filter(|pose| carried(pose).is_some());
+    let Some(link) = links().find(is_root).or(links().next()).map(|pose| &pose.child) else { return Ok(false) };
+    let own = of_topic().filter(|pose| pose.child == *link);
     let states: Vec<BaseState> = own.filter_map(|pose| Some(state(base, pose, carried(&pose)?, log.start))).collect();
     let states = in_order(states);
     let rows = between(&states, &log.times);
@@ -80,8 +79,16 @@ pub fn add_base(log: &mut JointLog, base: &Joint, model: &Model<f64>, poses: &[L
     for (k, name) in base.entry_names(1).into_iter().enumerate().filter(|_| velocities.is_some()) {
         push(log, name, LogQuantity::Velocity, velocity(k));
     }
-    log.others.retain(|topic| topic.name != chosen.1);
+    log.others.retain(|other| other.name != topic);
     Ok(true)
+}
+
+/// Where a link stands on the base, whose pose outside of the robot a message has.
+fn placement<'a>(model: &'a Model<f64>, pose: &LoggedPose) -> Option<&'a Transform<f64>> {
+    let is_of_the_robot = |name: &str| model.frame(name).is_some_and(|frame| frame.body.is_some());
+    let frame = model.frame(&pose.child).filter(|_| !is_of_the_robot(&pose.parent))?;
+    let body = &model.bodies[frame.body?];
+    body.joint.kind.is_base().then_some(&frame.placement)
 }
 
 /// A column more.
