@@ -87,25 +87,42 @@ pub fn with_whole_states(model: &Model<f64>, mut log: AlignedLog) -> Result<Alig
     Ok(log)
 }
 
+/// Brings the quaternion of a joint to length one, row by row; `turned` sees the joint's coordinates after that, and may change them.
+///
+/// # Errors
+/// What `turned` says.
+pub(crate) fn normalise<E>(
+    joint: &Joint,
+    q: &mut [Vec<f64>],
+    mut turned: impl FnMut(usize, &mut [f64]) -> Result<(), E>,
+) -> Result<(), E> {
+    let own = &mut q[joint.iq..joint.iq + joint.kind.nq()];
+    for i in 0..own[0].len() {
+        let mut now: Vec<f64> = own.iter().map(|column| column[i]).collect();
+        joint.kind.normalise(&mut now);
+        turned(i, &mut now)?;
+        own.iter_mut().zip(now).for_each(|(column, x)| column[i] = x);
+    }
+    Ok(())
+}
+
 /// Brings quaternions to length one, on the side of the row before.
 fn turn(model: &Model<f64>, log: &mut AlignedLog) -> Result<(), LogError> {
     for joint in independent(model) {
         let Some(first) = joint.kind.row().quaternion else { continue };
-        let own = joint.iq..joint.iq + joint.kind.nq();
-        let mut before = joint.kind.row().neutral.to_vec();
-        for i in 0..log.times.len() {
-            let mut now: Vec<f64> = log.q[own.clone()].iter().map(|column| column[i]).collect();
-            joint.kind.normalise(&mut now);
+        let mut before = joint.kind.row().neutral[first..].to_vec();
+        normalise(joint, &mut log.q, |i, now| {
             if now.iter().any(|x| !x.is_finite()) {
                 let what = format!("the quaternion of {} has no length", joint.name);
                 let place = format!("t = {:?} s", log.times[i]);
                 return Err(LogError::new(place, what, "write unit quaternions x, y, z, w"));
             }
-            let along: f64 = now[first..].iter().zip(&before[first..]).map(|(x, y)| x * y).sum();
-            now[first..].iter_mut().for_each(|x| *x *= along.signum());
-            log.q[own.clone()].iter_mut().zip(&now).for_each(|(column, x)| column[i] = *x);
-            before = now;
-        }
+            let now = &mut now[first..];
+            let along: f64 = now.iter().zip(&before).map(|(x, y)| x * y).sum();
+            now.iter_mut().for_each(|x| *x *= along.signum());
+            before.copy_from_slice(now);
+            Ok(())
+        })?;
     }
     Ok(())
 }

@@ -11,7 +11,8 @@ pub mod torques;
 pub use explain::{explain, Explanation, JointFigure, PayloadFigure, JOINT_PARAMETERS};
 
 use self::torques::{StateColumns, TorqueModel};
-use crate::log_states::{named_rates, NamedRate};
+use crate::log_states::{named_rates, normalise, NamedRate};
+use std::convert::Infallible;
 use straightline_logs::align::AlignedLog;
 use straightline_logs::observer::Observer;
 use straightline_logs::smooth::LowPass;
@@ -51,7 +52,9 @@ pub fn residual_torques(model: &TorqueModel, log: &AlignedLog, cutoff: f64) -> R
     let Some(qdd) = &log.qdd else {
         let filter = LowPass { cutoff };
         let ((mut q, _), (qd, qdd)) = (smoothed(log, &log.q, filter), smoothed(log, &log.qd, filter));
-        normalise(model, &mut q);
+        for joint in model.model.free_joints().filter(|joint| joint.kind.row().quaternion.is_some()) {
+            let Ok(()) = normalise::<Infallible>(joint, &mut q, |_, _| Ok(()));
+        }
         // LP τ − LP (d/dt p − f): what is smoothed is linear in what is measured, so that a fast motion leaves nothing behind
         let ((mut direct, _), (_, growth)) = (smoothed(log, &force, filter), smoothed(log, &momentum, filter));
         subtract(&mut direct, &growth);
@@ -61,18 +64,6 @@ pub fn residual_torques(model: &TorqueModel, log: &AlignedLog, cutoff: f64) -> R
     let mut direct = log.tau.clone();
     subtract(&mut direct, &model.inverse_dynamics([&motion[0], &motion[1], &motion[2]]));
     ResidualTorques { rates, cutoff: None, gain, motion, direct, observed }
-}
-
-/// Brings quaternions back to length one.
-fn normalise(model: &TorqueModel, q: &mut StateColumns) {
-    for joint in model.model.free_joints().filter(|joint| joint.kind.row().quaternion.is_some()) {
-        let own = &mut q[joint.iq..joint.iq + joint.kind.nq()];
-        for i in 0..own[0].len() {
-            let mut now: Vec<f64> = own.iter().map(|column| column[i]).collect();
-            joint.kind.normalise(&mut now);
-            own.iter_mut().zip(now).for_each(|(column, x)| column[i] = x);
-        }
-    }
 }
 
 fn subtract(from: &mut StateColumns, what: &StateColumns) {
