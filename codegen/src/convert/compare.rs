@@ -82,7 +82,14 @@ fn are_loops(wanted: &Model<Dd>, found: &Model<Dd>, longest: f64) -> bool {
     a.loops.len() == b.loops.len()
         && bodies(wanted) == bodies(found)
         && ways(a) == ways(b)
-        && a.loops.iter().zip(&b.loops).all(ends)
+        && a.loops.iter().zip(&b.loops).all(|loops| ends(loops) && are_turned_alike(loops))
+}
+
+/// Whether hinges and welds hold bodies the same way.
+fn are_turned_alike((a, b): (&ClosedLoop<Dd>, &ClosedLoop<Dd>)) -> bool {
+    let pairs = a.alignments.iter().flatten().zip(b.alignments.iter().flatten());
+    a.alignments.len() == b.alignments.len()
+        && pairs.into_iter().all(|(a, b)| all_near(&a.to_array(), &b.to_array(), 1.0))
 }
 
 fn magnitude(pose: &Transform<Dd>) -> f64 {

@@ -90,10 +90,10 @@ fn written(
     };
     by_magnitudes(&mut robot);
     springs::by_numbers(&mut robot, &model);
+    loops::by_frames(&mut robot, &model, writer.loops);
     for loss in writer.losses {
         lose(loss, format, options.lossy, &mut robot, diagnostics);
     }
-    loops::by_frames(&mut robot, &model);
     if diagnostics.has_errors() {
         return None;
     }

@@ -49,10 +49,10 @@ pub const CODES: &[&str] = &[
     "loop-within-body",
     "loop-open",
     "loop-locked",
-    "hinge-out-of-plane",
     "loop-joint",
     "loop-joint-determined",
     "loop-assembly",
+    "unused-axis",
     "loops-depend",
     "coupling-joint",
     "coupling-ratio-zero",
@@ -440,7 +440,7 @@ const PARALLEL_AXES: &str =
 pub fn loop_locked<'a>(name: &str, joints: impl IntoIterator<Item = &'a str>) -> D {
     let joints: Vec<&str> = joints.into_iter().collect();
     D::error("loop-locked", format!("loop `{}` holds its joints still: {}", cut(name), list(&joints)))
-        .detail("it has as many equations as its joints have coordinates: in a plane two where all axes are parallel, in space three")
+        .detail("it has as many equations as its joints have coordinates: a ball joint has two of a plane where all axes are parallel, or three of space; a hinge that leans out of its plane three or five, a weld three or six")
         .help(PARALLEL_AXES)
         .option("angle_tolerance", Some("1e-5".to_string()))
 }
@@ -458,6 +458,13 @@ pub fn loop_joint<'a>(name: &str, joint: &str, joints: impl IntoIterator<Item = 
 pub fn loop_joint_determined(joint: &str) -> D {
     let what = format!("the loops leave joint `{}` where it is once the joints before it are known", cut(joint));
     D::error("loop-joint-determined", what).help("leave it out of `determines`, or name another joint in its place")
+}
+
+/// An axis of a joint that has none.
+pub fn unused_axis(owner: &str) -> D {
+    D::error("unused-axis", format!("{owner} has an axis, and nothing turns about it alone"))
+        .detail("a ball joint turns about all axes, a weld about none")
+        .help("leave it out, or write `kind = \"revolute\"`")
 }
 
 /// An assembly of a loop that has no closed form.
@@ -519,15 +526,6 @@ pub fn damped_base_stands(value: f64) -> D {
     D::error("damped-base-stands", format!("the base has a damping of {value:?}, and does not move"))
         .detail("the damping acts on the velocities of a base that floats")
         .help("leave it out, or write `base = \"floating\"`")
-}
-
-/// A hinge that closes a loop which moves in space.
-pub fn hinge_out_of_plane(name: &str) -> D {
-    D::error("hinge-out-of-plane", format!("joint `{name}` closes a loop that does not move in a plane across its axis"))
-        .detail("points that coincide are all that a loop says: in a plane that is a hinge, in space a ball joint")
-        .help(
-            "write a ball joint where the loop has one as the joint whose child hangs on another joint, too, or make all axes of the loop parallel",
-        )
 }
 
 /// A time constant and a damping ratio with which nothing swings.
@@ -603,7 +601,7 @@ pub fn unknown_frame<'a>(frame: &str, frames: impl IntoIterator<Item = &'a str>)
 /// A link that is the child of two joints.
 pub fn two_parents(link: &str, first: &str, second: &str) -> D {
     D::error("two-parents", format!("link `{link}` is the child of joint `{second}` and of joint `{first}`"))
-        .detail("the links of a robot form a tree: closed chains are not supported yet")
+        .detail("the links of a robot form a tree, and what closes a loop is said apart: `[[loop]]` in TOML, `equality` in MJCF, in SDF a ball joint, a hinge or a fixed joint")
 }
 
 /// Several links without a parent.

@@ -26,7 +26,7 @@ pub mod write;
 mod written_pose;
 mod xml;
 
-pub use loops::{LoopPoints, WrittenAssembly, WrittenLoop};
+pub use loops::{ClosingJoint, LoopPoints, WrittenAssembly, WrittenLoop};
 pub use tree::*;
 pub use written_pose::*;
 

@@ -129,11 +129,7 @@ fn read_joint(reader: &mut FileReader, mut table: TomlTable) -> Option<WrittenJo
     if kind.as_ref().is_some_and(|k| k.value.has_axis()) {
         reader.require(&table, "axis", "axis = \"z\"");
     }
-    let axis = match table.get("axis") {
-        Some((DeValue::String(_), _)) => reader.word_at(&table, "axis", &AXES),
-        _ => reader.vector_at(&table, "axis"),
-    };
-    let axis = axis.unwrap_or_else(|| reader.value([0.0, 0.0, 1.0], &table.span));
+    let axis = reader.axis_at(&table, "axis").unwrap_or_else(|| reader.value([0.0, 0.0, 1.0], &table.span));
     if let (Some(kind), Some(composite)) = (&mut kind, composite) {
         kind.value.composite = Some(read_composite(reader, &table, composite));
     }
@@ -171,11 +167,7 @@ fn read_composite(reader: &mut FileReader, table: &TomlTable, of: &'static Compo
     let mut read = WrittenComposite { of, second_axis: [0.0, 0.0, 1.0], pitch: 1.0 };
     if of.has_second_axis {
         reader.require(table, "axis2", "axis2 = \"y\"");
-        let axis = match table.get("axis2") {
-            Some((DeValue::String(_), _)) => reader.word_at(table, "axis2", &AXES),
-            _ => reader.vector_at(table, "axis2"),
-        };
-        read.second_axis = axis.map_or(read.second_axis, |axis| axis.value);
+        read.second_axis = reader.axis_at(table, "axis2").map_or(read.second_axis, |axis| axis.value);
     }
     if of.has_pitch {
         let [pitch, lead] = ["pitch", "lead"].map(|key| reader.real_at(table, key, Range64::Finite));

@@ -21,7 +21,7 @@ impl RobotFunction for CloseLoops {
         inputs: &[Quantity::Configuration],
         outputs: &[
             Output::new("q_closed", &[Positions], "q with the independent joints where they were \\[rad or m\\]"),
-            Output::new("gap", &[LoopEquations], "how far the points of each loop are apart, along its directions \\[m\\]"),
+            Output::new("gap", &[LoopEquations], "how far the points of each loop are apart, along its directions \\[m\\], and how far hinges and welds lean \\[1\\]"),
         ],
         ..OF_LOOPS
     };

@@ -54,7 +54,7 @@ impl Extent {
             Extent::DriveStates => drive_states(model),
             Extent::Drives => model.drives.len(),
             Extent::Dependents => model.open_nv() - model.nv(),
-            Extent::LoopEquations => model.closure.loops.iter().map(|of| of.directions.len()).sum(),
+            Extent::LoopEquations => model.closure.loops.iter().map(|of| of.equations()).sum(),
             Extent::BaseParameters => model.base_parameters.of_forces.len(),
             Extent::SupportParameters => model.base_parameters.of_support.len(),
             Extent::RegressorEntries => model.base_parameters.of_forces.iter().map(|p| p.rows.len()).sum(),

@@ -20,6 +20,9 @@ pub(super) fn dyad_of(model: &Model<Dd>, of: &ClosedLoop<Dd>, dependents: &[Body
     if !dependents.iter().all(|b| is_elementary(b) && !moves_others(b)) {
         return None;
     }
+    if !of.alignments.is_empty() {
+        return None;
+    }
     let pivots: Vec<Vec<BodyId>> = match (of.directions.len(), dependents.len()) {
         (2, 2) => dependents.iter().rev().filter(|b| kind(**b).turns()).map(|b| vec![*b]).collect(),
         (3, 3) => {

@@ -1,19 +1,21 @@
-//! Closed loops, from names to equations: where the points are, along which directions they could part, which joints follow from which loops.
+//! Closed loops, from names to equations: where the bodies meet (`meeting`), in which configurations, and which joints follow from which loops.
 //!
 //! Joints that loops determine are chosen by the rank of the equations' columns in closed configurations, which Newton's method finds from poses within the
 //! joints' ranges: those that nothing drives first, and of those the last of the file.
 
+mod meeting;
+
+use self::meeting::LoopMeeting;
 use super::dyads::dyad_of;
-use super::geometry::{point, snap_vector, vector};
 use super::{Assembly, ModelOptions};
 use crate::description::angle::{self, ROUNDING};
-use crate::description::{messages, Description, LoopPoints, Noted, PoseCoordinate, WrittenLoop};
+use crate::description::{messages, Description, Noted, PoseCoordinate, WrittenLoop};
 use crate::diagnostic::Diagnostics;
 use straightline_core::algorithms as alg;
-use straightline_core::closure::{ClosedLoop, Closure, LoopEnd, LoopGroup};
-use straightline_core::model::{Body, BodyId, Frame, Model};
+use straightline_core::closure::{ClosedLoop, Closure, LoopGroup};
+use straightline_core::model::{Body, BodyId, Model};
 use straightline_core::random::Random;
-use straightline_core::spatial::{Transform, Vec3};
+use straightline_core::spatial::Vec3;
 use straightline_core::Dd;
 
 /// So many closed configurations are looked for.
@@ -26,8 +28,6 @@ const STEPS: usize = 60;
 const CLOSED: f64 = 1e-11;
 /// How much of a joint's column the columns before it must leave in every closed configuration, and in some, so that the loop determines it.
 const WELL_LEFT: [f64; 2] = [1e-2, 1e-7];
-/// Axes that are so nearly parallel are \[rad\].
-const PARALLEL: f64 = 1e-9;
 /// More loops than these are solved at once.
 const MOST_TRIED: usize = 12;
 
@@ -41,26 +41,20 @@ pub(super) fn resolve(
 ) -> Closure<Dd> {
     let written: Vec<&WrittenLoop> = description.loops.iter().filter(|_| !options.open_loops).collect();
     let zero = pose_of_file(description, model);
-    let mut loops = Vec::new();
+    let (mut loops, mut meetings) = (Vec::new(), Vec::new());
     for own in &written {
-        let Some(ends) = ends(own, assembly, model, &zero, diagnostics) else { continue };
-        if ends[0].body == ends[1].body {
+        let Some(meeting) = LoopMeeting::of(own, assembly, model, &zero, diagnostics) else { continue };
+        if meeting.ends[0].body == meeting.ends[1].body {
             diagnostics.push(messages::loop_within_body(&own.name.value).at(&own.name.place));
             continue;
         }
-        let closed = ClosedLoop { name: own.name.value.clone(), ends, directions: Vec::new() };
-        let directions = directions(&closed, model, &zero);
-        if let Some(axis) = &own.hinge {
-            if !is_in_plane(own, axis, (&closed, &directions), assembly, (model, &zero)) {
-                diagnostics.push(messages::hinge_out_of_plane(&own.name.value).at(&own.name.place));
-            }
-        }
-        loops.push(ClosedLoop { directions, ..closed });
+        loops.push(meeting.equations(own, model, &zero));
+        meetings.push(meeting);
     }
     if loops.len() < written.len() || loops.is_empty() || diagnostics.has_errors() {
         return Closure::default();
     }
-    let equations = LoopEquations::new(model.cast(), &loops, &zero);
+    let equations = LoopEquations::new(model.cast(), &loops, meetings, &zero);
     if equations.configurations.is_empty() {
         for (own, gap) in written.iter().zip(&equations.least) {
             diagnostics.push(messages::loop_open(&own.name.value, *gap).at(&own.name.place));
@@ -76,7 +70,7 @@ pub(super) fn resolve(
 }
 
 /// The coordinates of the tree in the pose that the file shows.
-pub(super) fn pose_of_file(description: &Description, model: &Model<Dd>) -> Vec<Dd> {
+pub(crate) fn pose_of_file(description: &Description, model: &Model<Dd>) -> Vec<Dd> {
     let mut zero = vec![Dd::ZERO; model.nq()];
     for joint in model.free_joints() {
         if let Some(w) = joint.kind.row().quaternion {
@@ -91,105 +85,11 @@ pub(super) fn pose_of_file(description: &Description, model: &Model<Dd>) -> Vec<
     zero
 }
 
-/// The points that a loop joins.
-fn ends(
-    own: &WrittenLoop,
-    assembly: &Assembly,
-    model: &Model<Dd>,
-    zero: &[Dd],
-    diagnostics: &mut Diagnostics,
-) -> Option<[LoopEnd<Dd>; 2]> {
-    let owner = format!("loop `{}`", own.name.value);
-    let mut at = |name: Option<&Noted<String>>, position: Vec3<Dd>| {
-        let Some(name) = name else { return Some(LoopEnd { body: None, point: position }) };
-        let Some(carrier) = assembly.links.get(&name.value) else {
-            let known = assembly.links.keys().map(String::as_str);
-            diagnostics.push(messages::unknown_link(&owner, &name.value, known).at(&name.place));
-            return None;
-        };
-        let (body, x_body_link) = carrier.at(position);
-        Some(LoopEnd { body, point: point(&x_body_link, position) })
-    };
-    match &own.points {
-        LoopPoints::Frames(frames) => {
-            let [one, other] = frames.each_ref().map(|frame| at(Some(frame), Vec3::zero()));
-            Some([one?, other?])
-        }
-        LoopPoints::Anchor { links: [one, other], point: position } => {
-            let one = at(one.as_ref(), vector(position.value));
-            let other = at(other.as_ref(), Vec3::zero());
-            let (one, other) = (one?, other?);
-            let [of_one, of_other] = [one.body, other.body].map(|body| pose(model, zero, body));
-            let met = of_one.rotation * one.point + of_one.translation - of_other.translation;
-            Some([one, LoopEnd { body: other.body, point: of_other.rotation.transpose_mul(met) }])
-        }
-    }
-}
-
-/// Whether the axis of a hinge that closes a loop is the normal of a plane to which all joints of the loop are bound.
-fn is_in_plane(
-    own: &WrittenLoop,
-    axis: &Noted<[f64; 3]>,
-    (closed, directions): (&ClosedLoop<Dd>, &[Vec3<Dd>]),
-    assembly: &Assembly,
-    (model, zero): (&Model<Dd>, &[Dd]),
-) -> bool {
-    let ([across, along], LoopPoints::Anchor { links: [Some(link), _], .. }) = (directions, &own.points) else {
-        return false;
-    };
-    let Some(carrier) = assembly.links.get(&link.value) else { return false };
-    let (body, x_body_link) = carrier.at(Vec3::zero());
-    let in_world = pose(model, zero, body).rotation * (x_body_link.rotation * vector(axis.value));
-    let in_base = pose(model, zero, model.parting(closed)).rotation.transpose_mul(in_world);
-    let normal = across.cross(*along);
-    length(normal.cross(in_base)) < PARALLEL * length(in_base)
-}
-
-fn pose(model: &Model<Dd>, q: &[Dd], body: Option<BodyId>) -> Transform<Dd> {
-    let frame = Frame { name: String::new(), body, placement: Transform::identity() };
-    alg::forward_kinematics(model, q, &[&frame])[0]
-}
-
-/// Three directions, or the two of a plane to which all joints on the way are bound.
-fn directions(of: &ClosedLoop<Dd>, model: &Model<Dd>, zero: &[Dd]) -> Vec<Vec3<Dd>> {
-    let bodies = model.bodies_of_loop(of);
-    let base = pose(model, zero, model.parting(of));
-    let axis = |b: BodyId| base.rotation.transpose_mul(pose(model, zero, Some(b)).rotation.column(2));
-    let all = vec![Vec3::unit(0), Vec3::unit(1), Vec3::unit(2)];
-    let joints = || bodies.iter().map(|b| (*b, &model.bodies[*b].joint.kind));
-    let Some(normal) = joints().find(|(_, kind)| kind.is_single() && kind.turns()).map(|(b, _)| axis(b)) else {
-        return all;
-    };
-    let is_plane = joints().all(|(b, kind)| {
-        kind.is_single()
-            && match (kind.turns(), kind.slides()) {
-                (true, false) => length(axis(b).cross(normal)) < PARALLEL,
-                (false, true) => axis(b).dot(normal).to_f64().abs() < PARALLEL,
-                // along and about an axis at once
-                _ => false,
-            }
-    });
-    if !is_plane {
-        return all;
-    }
-    let normal = snap_vector(normal, 1.0);
-    // across the normal: what is left of the axis that is least along it
-    let parts = normal.to_array().map(|x| x.to_f64().abs());
-    let least = (0..3).min_by(|a, b| parts[*a].total_cmp(&parts[*b])).expect("there are three");
-    let axis = Vec3::unit(least);
-    let across = axis - normal.scale(normal.dot(axis));
-    let across = across.scale(Dd::ONE / across.dot(across).sqrt());
-    vec![snap_vector(across, 1.0), snap_vector(normal.cross(across), 1.0)]
-}
-
-fn length(v: Vec3<Dd>) -> f64 {
-    v.dot(v).to_f64().sqrt()
-}
-
 /// The equations of all loops in numbers.
 struct LoopEquations {
     model: Model<f64>,
     loops: Vec<ClosedLoop<f64>>,
+    meetings: Vec<LoopMeeting>,
     /// Where all loops are closed; the first is nearest to the pose of the file.
     configurations: Vec<Vec<f64>>,
     /// How near the points of each loop came \[m\].
@@ -197,16 +97,16 @@ struct LoopEquations {
 }
 
 impl LoopEquations {
-    fn new(model: Model<f64>, loops: &[ClosedLoop<Dd>], zero: &[Dd]) -> LoopEquations {
+    fn new(model: Model<f64>, loops: &[ClosedLoop<Dd>], meetings: Vec<LoopMeeting>, zero: &[Dd]) -> LoopEquations {
         let zero: Vec<f64> = zero.iter().map(|x| x.to_f64()).collect();
         let closure = Closure { loops: loops.to_vec(), groups: Vec::new(), home: Vec::new() };
         let loops = closure.map(|x| x.to_f64()).loops;
-        let mut all = LoopEquations { model, loops, configurations: Vec::new(), least: Vec::new() };
+        let mut all = LoopEquations { model, loops, meetings, configurations: Vec::new(), least: Vec::new() };
         let mut random = Random(0x10_09);
         for pose in 0..POSES {
             let start = if pose == 0 { zero.clone() } else { all.near(&zero, &mut random) };
             let (q, gaps) = all.closed(start);
-            let is_closed = gaps.iter().all(|gap| *gap <= CLOSED * all.size());
+            let is_closed = gaps.iter().all(|gap| *gap <= CLOSED * all.size()) && all.is_turned_right(&q);
             if is_closed {
                 all.configurations.push(q);
             }
@@ -243,11 +143,27 @@ impl LoopEquations {
         alg::integrate(&self.model, zero, &v)
     }
 
-    /// Gaps of all loops, one after the other, and the rows of their rates.
+    /// Gaps of all loops, one after the other, and the rows of their rates: those of vectors at the arm of the robot's size.
     fn at(&self, q: &[f64]) -> (Vec<f64>, Vec<Vec<f64>>) {
         let y = self.model.tree_positions(q);
-        let gaps = self.loops.iter().flat_map(|l| self.model.gap(l, &y)).collect();
-        (gaps, self.loops.iter().flat_map(|l| self.model.gap_rows(l, &y)).collect())
+        let rows = |l: &ClosedLoop<f64>| {
+            let arms = std::iter::repeat_n(1.0, l.directions.len()).chain(std::iter::repeat(self.size()));
+            let rows = self.model.gap_rows(l, &y).into_iter().zip(arms);
+            rows.map(|(row, arm)| row.iter().map(|x| arm * x).collect()).collect::<Vec<Vec<f64>>>()
+        };
+        (self.loops.iter().flat_map(|l| self.gap(l, &y)).collect(), self.loops.iter().flat_map(rows).collect())
+    }
+
+    /// The gap of a loop \[m\], of vectors at the arm of the robot's size.
+    fn gap(&self, of: &ClosedLoop<f64>, y: &[f64]) -> Vec<f64> {
+        let mut gap = self.model.gap(of, y);
+        gap.iter_mut().skip(of.directions.len()).for_each(|lean| *lean *= self.size());
+        gap
+    }
+
+    /// Whether bodies stand as they are joined, and not turned over.
+    fn is_turned_right(&self, q: &[f64]) -> bool {
+        self.loops.iter().zip(&self.meetings).all(|(of, meeting)| meeting.is_turned_right(of, &self.model, q))
     }
 
     /// Where Newton's method leads, by the shortest steps, and how far the points of each loop are apart there.
@@ -273,7 +189,7 @@ impl LoopEquations {
             q = alg::integrate(&self.model, &q, &v);
         }
         let y = self.model.tree_positions(&q).into_owned();
-        let apart = |l: &ClosedLoop<f64>| self.model.gap(l, &y).iter().map(|x| x * x).sum::<f64>().sqrt();
+        let apart = |l: &ClosedLoop<f64>| self.gap(l, &y).iter().map(|x| x * x).sum::<f64>().sqrt();
         let gaps = self.loops.iter().map(apart).collect();
         (q, gaps)
     }
@@ -320,7 +236,7 @@ fn dependents(
     let (asked, mut order) =
         (asked(written, equations, model, diagnostics)?, candidates(description, equations, model));
     order.retain(|b| !asked.iter().any(|(_, own)| own == b));
-    let rows: usize = equations.loops.iter().map(|l| l.directions.len()).sum();
+    let rows: usize = equations.loops.iter().map(ClosedLoop::equations).sum();
     let mut chosen = DependentChoice {
         bases: equations.columns().into_iter().map(|columns| TakenColumns { columns, basis: Vec::new() }).collect(),
     };
@@ -469,7 +385,7 @@ fn groups(loops: &[ClosedLoop<Dd>], dependents: &[BodyId], model: &Model<Dd>) ->
         };
         let is_square = |set: &Vec<usize>| {
             let coordinates: usize = unknown(set).iter().map(|b| model.bodies[*b].joint.kind.nv()).sum();
-            coordinates == set.iter().map(|l| loops[*l].directions.len()).sum::<usize>()
+            coordinates == set.iter().map(|l| loops[*l].equations()).sum::<usize>()
         };
         let set = subsets(&left).find(is_square).unwrap_or_else(|| left.clone());
         let mut own = unknown(&set);

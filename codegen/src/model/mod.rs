@@ -48,6 +48,7 @@ pub(crate) use crate::description::{angle, geometry, merge};
 use crate::diagnostic::{Diagnostics, Place, Source};
 use angle::transform;
 use geometry::{compose, vector};
+pub(crate) use loops::pose_of_file;
 use std::collections::{BTreeMap, HashMap};
 use straightline_core::closure::Closure;
 use straightline_core::coupling::Coupling;

@@ -165,9 +165,10 @@ fn lock(model: Model<Dd>, held: &[Option<Held>]) -> Model<Dd> {
     let at = |body: Option<BodyId>| body.map_or((None, Transform::identity()), |body| carriers[body]);
     let mut closure = model.closure;
     for (own, parting) in closure.loops.iter_mut().zip(partings) {
-        for end in &mut own.ends {
+        for (k, end) in own.ends.iter_mut().enumerate() {
             let (body, x_carrier_body) = at(end.body);
             *end = LoopEnd { body, point: point(&x_carrier_body, end.point) };
+            own.alignments.iter_mut().for_each(|pair| pair[k] = x_carrier_body.rotation * pair[k]);
         }
         let turned = at(parting).1.rotation;
         own.directions.iter_mut().for_each(|direction| *direction = turned * *direction);

@@ -1,8 +1,8 @@
 //! Closed loops in the reference's terms: frames whose origins coincide.
 
 use super::reference_input::radians;
-use crate::description::{Description, LoopPoints, Noted, PoseCoordinate};
-use crate::function::truth::ClosedLoops;
+use crate::description::{ClosingJoint, Description, LoopPoints, Noted, PoseCoordinate};
+use crate::function::truth::{ClosedLoops, ClosedMeeting, Turning};
 use crate::model::ModelOptions;
 use nalgebra::{Matrix3, Vector3};
 use straightline_core::model::Model;
@@ -20,9 +20,9 @@ pub(super) fn closed_loops(
         return Ok(None);
     }
     let q = pose_of_file(description, options, tree, model);
-    let mut ends = Vec::new();
-    for written in &description.loops {
-        ends.push(match &written.points {
+    let mut meetings = Vec::new();
+    for (written, of) in description.loops.iter().zip(&model.closure.loops) {
+        let ends = match &written.points {
             LoopPoints::Frames([one, other]) => [at(tree, Some(one))?, at(tree, Some(other))?],
             LoopPoints::Anchor { links: [one, other], point } => {
                 let [x, y, z] = point.value.map(Dd::from);
@@ -33,10 +33,18 @@ pub(super) fn closed_loops(
                 let own = pose.rotation.transpose() * (met - pose.position);
                 [one, CentreOfMassFrame { position: other.position + other.rotation * own, ..other }]
             }
-        });
+        };
+        // in their plane points are all that holds hinges
+        let turning = match &written.joint {
+            _ if of.alignments.is_empty() => Turning::Free,
+            ClosingJoint::Spherical => Turning::Free,
+            ClosingJoint::Revolute(axis) => Turning::About(Vector3::from(axis.value.map(Dd::from))),
+            ClosingJoint::Fixed => Turning::None,
+        };
+        meetings.push(ClosedMeeting { ends, turning });
     }
-    let equations = model.closure.loops.iter().map(|of| of.directions.len()).sum();
-    Ok(Some(ClosedLoops { ends, independent: model.nv(), equations }))
+    let equations = model.closure.loops.iter().map(|of| of.equations()).sum();
+    Ok(Some(ClosedLoops { meetings, independent: model.nv(), equations }))
 }
 
 fn at(tree: &CentreOfMassTree<Dd>, name: Option<&Noted<String>>) -> Result<CentreOfMassFrame<Dd>, String> {

@@ -23,12 +23,12 @@ fn source(name: &str) -> Source {
     Source::new(&format!("{name}.xml"), std::fs::read_to_string(path).expect("the data"))
 }
 
-fn model(source: &Source, options: &ModelOptions) -> Model<Dd> {
+pub fn model(source: &Source, options: &ModelOptions) -> Model<Dd> {
     let (model, said) = load(source, options);
     model.unwrap_or_else(|| panic!("{}", said.render()))
 }
 
-fn verified(source: &Source, is_wanted: impl Fn(Function) -> bool) {
+pub fn verified(source: &Source, is_wanted: impl Fn(Function) -> bool) {
     let of_robot = model(source, &ModelOptions::default());
     let functions: Vec<Function> = Function::known().filter(|f| f.is_of(&of_robot) && is_wanted(*f)).collect();
     let options = Options { functions: functions.clone(), ..Options::default() };
@@ -70,7 +70,7 @@ fn functions_of_all_robots_with_loops_are_the_second_authors() {
 }
 
 /// A closed configuration in double-double, velocities and accelerations.
-fn state(model: &Model<Dd>, random: &mut Random) -> [Vec<Dd>; 3] {
+pub fn state(model: &Model<Dd>, random: &mut Random) -> [Vec<Dd>; 3] {
     let home: Vec<f64> = model.closure.home.iter().map(|x| x.to_f64()).collect();
     let mut numbers = |n: usize, bound: f64| -> Vec<f64> { (0..n).map(|_| random.symmetric(bound)).collect() };
     let away = alg::integrate(&model.cast::<f64>(), &home, &numbers(model.nv(), 0.1));
@@ -79,7 +79,7 @@ fn state(model: &Model<Dd>, random: &mut Random) -> [Vec<Dd>; 3] {
     for joint in model.free_joints() {
         joint.kind.normalise(&mut q[joint.iq..joint.iq + joint.kind.nq()]);
     }
-    let q = model.close_loops(&q, 4).0;
+    let q = model.close_loops(&q, 8).0;
     [q, wide(numbers(model.nv(), 2.0)), wide(numbers(model.nv(), 10.0))]
 }
 

@@ -13,6 +13,7 @@ mod c99_readback;
 mod certificates;
 mod certificates_of_robots;
 mod chain;
+mod closing_joints;
 mod columns;
 mod companions;
 mod composites;

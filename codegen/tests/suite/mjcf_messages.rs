@@ -87,8 +87,9 @@ fn what_changes_the_dynamics_and_is_not_read_is_an_error() {
         (world, "</worldbody><compiler eulerseq=\"xyw\"/>", "unknown-word", 4),
         (world, "</worldbody><include/>", "missing-attribute", 4),
         (world, "</worldbody><include file=\"no such file.xml\"/>", "include-failed", 4),
-        (world, "</worldbody><equality><weld body1=\"a\"/></equality>", "not-supported-yet", 4),
-        (world, "</worldbody><equality><joint joint1=\"j\"/></equality>", "not-supported-yet", 4),
+        (world, "</worldbody><equality><weld body1=\"a\"/></equality>", "loops-depend", 4),
+        (world, "</worldbody><equality><weld body2=\"a\"/></equality>", "missing-attribute", 4),
+        (world, "</worldbody><equality><weld body1=\"none\"/></equality>", "unknown-link", 4),
         (world, "</worldbody><equality><joint joint1=\"j\" joint2=\"l\"/></equality>", "drive-joint", 4),
         (
             world,

@@ -1,4 +1,4 @@
-//! Closed loops: points of two bodies that stay together, as where a rod ends on a foot.
+//! Closed loops: points of two bodies that stay together, as where a rod ends on a foot, of a hinge with their axes, of a weld whichever way they turn.
 //!
 //! A robot with loops is the tree that is left where they are cut, moved by fewer velocities. Its configuration q holds the coordinates of all joints but
 //! [followers](crate::coupling), and closes the loops. Of its velocities some are independent; those of the other joints, the dependent ones, follow from the
@@ -13,19 +13,21 @@
 //! what moves the loop as a whole is not in them. Loops are solved one group after the other, each for as many coordinates as it has equations.
 
 mod dyad;
+mod mechanism;
 mod plane;
 
 pub use dyad::{Dyad, DyadWay};
 
-use crate::algorithms::{forward_kinematics, frame_acceleration, jacobian};
-use crate::model::{Body, BodyId, Frame, Joint, Model};
+use crate::algorithms::{forward_kinematics, frame_acceleration, frame_velocity, jacobian};
+use crate::model::{BodyId, Model};
 use crate::real::Real;
-use crate::spatial::{Mat3, Transform, Vec3};
+use crate::spatial::Vec3;
 use alloc::borrow::Cow;
 use alloc::collections::BTreeSet;
 use alloc::string::String;
 use alloc::vec;
 use alloc::vec::Vec;
+use mechanism::Mechanism;
 use plane::PlaneLoop;
 
 /// A point of a body.
@@ -37,7 +39,7 @@ pub struct LoopEnd<T> {
     pub point: Vec3<T>,
 }
 
-/// Two points that coincide.
+/// Two points that coincide, and vectors that stay perpendicular.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ClosedLoop<T> {
     /// What messages and reports call it.
@@ -46,20 +48,29 @@ pub struct ClosedLoop<T> {
     pub ends: [LoopEnd<T>; 2],
     /// Along which the points could part: three directions, or two of a plane mechanism, in the canonical frame of the body where the paths part.
     pub directions: Vec<Vec3<T>>,
+    /// Unit vectors in the canonical frames of both ends' bodies, or in the world, that stay perpendicular: two across the axis of a hinge, the three of a
+    /// weld, or its one in a plane. With them as columns of R, c = u · v and ċ = (ω₂ − ω₁) · (v × u).
+    pub alignments: Vec<[Vec3<T>; 2]>,
 }
 
 impl<T: Copy> ClosedLoop<T> {
+    /// Number of its equations.
+    pub fn equations(&self) -> usize {
+        self.directions.len() + self.alignments.len()
+    }
+
     fn map<U: Copy>(&self, f: &mut impl FnMut(T) -> U) -> ClosedLoop<U> {
         let mut vector = |v: Vec3<T>| Vec3::new(f(v.x), f(v.y), f(v.z));
         ClosedLoop {
             name: self.name.clone(),
             ends: self.ends.map(|end| LoopEnd { body: end.body, point: vector(end.point) }),
             directions: self.directions.iter().map(|d| vector(*d)).collect(),
+            alignments: self.alignments.iter().map(|pair| pair.map(&mut vector)).collect(),
         }
     }
 }
 
-/// Loops that are solved at once, for as many velocities as they have directions.
+/// Loops that are solved at once, for as many velocities as they have equations.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct LoopGroup {
     /// Indices of the loops.
@@ -110,55 +121,6 @@ impl<T> Closure<T> {
     }
 }
 
-/// A loop alone: the bodies on both paths from the one where they part, as a robot that stands there.
-struct Mechanism<T> {
-    model: Model<T>,
-    /// Its bodies in the whole robot.
-    bodies: Vec<BodyId>,
-    ends: [Frame<T>; 2],
-}
-
-impl<T: Real> Mechanism<T> {
-    fn new(whole: &Model<T>, of: &ClosedLoop<T>) -> Self {
-        let [mut one, mut other] = of.ends.map(|end| whole.path_to(end.body));
-        let common = one.iter().zip(&other).take_while(|(a, b)| a == b).count();
-        let bodies: Vec<BodyId> = one.drain(common..).chain(other.drain(common..)).collect();
-        let place = |body: Option<BodyId>| body.and_then(|body| bodies.iter().position(|b| *b == body));
-        let (mut iq, mut iv) = (0, 0);
-        let mut own = Vec::with_capacity(bodies.len());
-        for &b in &bodies {
-            let body = &whole.bodies[b];
-            let joint = Joint { iq, iv, ..body.joint.clone() };
-            (iq, iv) = (iq + joint.kind.nq(), iv + joint.kind.nv());
-            own.push(Body { parent: place(body.parent), joint, ..body.clone() });
-        }
-        let ends = of.ends.map(|end| Frame {
-            name: String::new(),
-            body: place(end.body),
-            placement: Transform { rotation: Mat3::identity(), translation: end.point },
-        });
-        let model = Model {
-            name: String::new(),
-            bodies: own,
-            couplings: Vec::new(),
-            closure: Closure::default(),
-            gravity: Vec3::zero(),
-            frames: Vec::new(),
-            drives: Vec::new(),
-            base_parameters: Default::default(),
-        };
-        Mechanism { model, bodies, ends }
-    }
-
-    fn coordinates(&self, whole: &Model<T>, y: &[T]) -> Vec<T> {
-        self.bodies.iter().flat_map(|b| whole.bodies[*b].joint.coordinates(y)).copied().collect()
-    }
-
-    fn rates(&self, whole: &Model<T>, rates: &[T]) -> Vec<T> {
-        self.bodies.iter().flat_map(|b| whole.bodies[*b].joint.rates(rates)).copied().collect()
-    }
-}
-
 impl<T: Real> Model<T> {
     /// Number of velocity coordinates that are not followers': independent and dependent ones.
     pub fn open_nv(&self) -> usize {
@@ -196,13 +158,16 @@ impl<T: Real> Model<T> {
         on_loops.map(source).filter(|b| !group.dependents.contains(b)).flat_map(|b| self.movers(b)).collect()
     }
 
-    /// How far the points of a loop are apart along its directions \[m\], from the configuration of the tree.
+    /// How far the points of a loop are apart along its directions \[m\], then how far vectors lean from being perpendicular (their cosines), from the
+    /// configuration of the tree.
     pub fn gap(&self, of: &ClosedLoop<T>, y: &[T]) -> Vec<T> {
         let alone = Mechanism::new(self, of);
         let frames = alone.ends.each_ref();
         let at = forward_kinematics(&alone.model, &alone.coordinates(self, y), &frames);
         let apart = at[1].translation - at[0].translation;
-        of.directions.iter().map(|direction| direction.dot(apart)).collect()
+        let parting = of.directions.iter().map(|direction| direction.dot(apart));
+        let leaning = of.alignments.iter().map(|[u, v]| (at[0].rotation * *u).dot(at[1].rotation * *v));
+        parting.chain(leaning).collect()
     }
 
     /// How fast they part, by rows over the velocities that are not followers'.
@@ -210,8 +175,9 @@ impl<T: Real> Model<T> {
         let alone = Mechanism::new(self, of);
         let own = alone.coordinates(self, y);
         let [one, other] = alone.ends.each_ref().map(|end| jacobian(&alone.model, &own, end));
+        let across: Vec<Vec3<T>> = alone.aligned(of, &own).into_iter().map(|[u, v]| v.cross(u)).collect();
         let width = alone.model.tree_nv();
-        let mut rows = vec![vec![T::zero(); self.open_nv()]; of.directions.len()];
+        let mut rows = vec![vec![T::zero(); self.open_nv()]; of.equations()];
         for (&b, body) in alone.bodies.iter().zip(&alone.model.bodies) {
             let (first, ratio) = self.moved_by(b);
             for k in 0..body.joint.kind.nv() {
@@ -220,8 +186,12 @@ impl<T: Real> Model<T> {
                     other[place] - one[place]
                 };
                 let column = Vec3::new(apart(0), apart(1), apart(2));
-                for (row, direction) in rows.iter_mut().zip(&of.directions) {
-                    let entry = direction.dot(column);
+                let mut entries: Vec<T> = of.directions.iter().map(|direction| direction.dot(column)).collect();
+                if !across.is_empty() {
+                    let turning = Vec3::new(apart(3), apart(4), apart(5));
+                    entries.extend(across.iter().map(|across| across.dot(turning)));
+                }
+                for (row, entry) in rows.iter_mut().zip(entries) {
                     let entry = ratio.map_or(entry, |ratio| ratio * entry);
                     row[first + k] = row[first + k] + entry;
                 }
@@ -230,14 +200,25 @@ impl<T: Real> Model<T> {
         rows
     }
 
-    /// How their parting accelerates where no joint does: J̇ ẋ \[m/s²\].
+    /// How their parting and leaning accelerate where no joint does: J̇ ẋ \[m/s² or 1/s²\].
     fn gap_drift(&self, of: &ClosedLoop<T>, y: &[T], rates: &[T]) -> Vec<T> {
         let alone = Mechanism::new(self, of);
         let (q, qd) = (alone.coordinates(self, y), alone.rates(self, rates));
         let rest = vec![T::zero(); qd.len()];
-        let [one, other] =
-            alone.ends.each_ref().map(|end| frame_acceleration(&alone.model, &q, &qd, &rest, end).linear);
-        of.directions.iter().map(|direction| direction.dot(other - one)).collect()
+        let [one, other] = alone.ends.each_ref().map(|end| frame_acceleration(&alone.model, &q, &qd, &rest, end));
+        let apart = other.linear - one.linear;
+        let mut drift: Vec<T> = of.directions.iter().map(|direction| direction.dot(apart)).collect();
+        if !of.alignments.is_empty() {
+            let [turn, other_turn] =
+                alone.ends.each_ref().map(|end| frame_velocity(&alone.model, &q, &qd, end).angular);
+            let (turning, apart) = (other_turn - turn, other.angular - one.angular);
+            let of_pair = |[u, v]: [Vec3<T>; 2]| {
+                let across_rate = other_turn.cross(v).cross(u) + v.cross(turn.cross(u));
+                v.cross(u).dot(apart) + across_rate.dot(turning)
+            };
+            drift.extend(alone.aligned(of, &q).into_iter().map(of_pair));
+        }
+        drift
     }
 
     /// The velocity coordinates that a group determines.
@@ -297,7 +278,7 @@ impl<T: Real> Model<T> {
         }
         let nv = self.nv();
         let unit = |i: usize| (0..nv).map(|k| if i == k { T::one() } else { T::zero() }).collect();
-        let right = |l: usize| vec![vec![T::zero(); nv]; self.closure.loops[l].directions.len()];
+        let right = |l: usize| vec![vec![T::zero(); nv]; self.closure.loops[l].equations()];
         self.solved(y, (0..nv).map(unit).collect(), right).split_off(nv)
     }
 
@@ -335,7 +316,7 @@ impl<T: Real> Model<T> {
     }
 
     /// Moves the dependent joints of q by Newton's method until the loops close, from where q has them, in so many steps; then how far the points of
-    /// each loop are apart along its directions \[m\].
+    /// each loop are apart along its directions \[m\], and how far vectors lean (their cosines).
     pub fn close_loops(&self, q: &[T], steps: usize) -> (Vec<T>, Vec<T>) {
         let mut q = q.to_vec();
         for group in &self.closure.groups {
@@ -374,6 +355,9 @@ const ASSEMBLY_STEPS: usize = 32;
 /// So far \[rad or m\] a dependent joint goes in one of them, and so near loops come \[m\], or the way ends there: a singular pose is near.
 const LONGEST_STEP: f64 = 0.4;
 const CLOSED: f64 = 1e-9;
+/// What rounding leaves open [m], and so many of Newton's steps from less than [`CLOSED`] on.
+const LEFT_BY_ROUNDING: f64 = 2e-15;
+const LAST_STEPS: usize = 2;
 /// Newton's steps from one row of a motion to the next, and how near loops have to come then \[m\].
 const STEPS_ALONG_MOTIONS: usize = 20;
 const CLOSED_ALONG_MOTIONS: f64 = 1e-6;
@@ -419,7 +403,11 @@ impl Model<f64> {
             }
             at = next;
         }
-        at
+        // displacements of loops of many joints leave gaps
+        match self.is_closed(&at, LEFT_BY_ROUNDING) {
+            true => at,
+            false => self.close_loops(&at, LAST_STEPS).0,
+        }
     }
 }
 

@@ -39,6 +39,11 @@ pub(super) struct Contents<'s> {
 }
 
 impl<'s> Contents<'s> {
+    /// The link of the body.
+    pub fn link(&self) -> &Noted<String> {
+        &self.link
+    }
+
     /// The elements of a name.
     pub fn of(&self, name: &str) -> Vec<&Content<'s>> {
         self.all.iter().filter(|content| content.element.name == name).collect()
@@ -103,6 +108,9 @@ impl<'s> Mjcf<'s> {
         let (objects, moving) = if robots.is_empty() { (Vec::new(), moving) } else { (objects, robots) };
         let free = moving.iter().filter(|body| self.free_joint(body).is_some()).count();
         let base = if free == 1 && moving.len() == 1 { moving.first().copied() } else { None };
+        let held = base.filter(|base| self.is_held(base));
+        self.held = held.and_then(|base| base.attribute("name")).map(|name| name.value.clone());
+        let base = base.filter(|_| held.is_none());
         match base {
             Some(base) => {
                 let place = self.free_joint(base).map_or_else(|| self.tag(base), |joint| self.tag(joint));

@@ -4,7 +4,11 @@ use super::classes::Defaulted;
 use super::files::{Attribute, Element};
 use super::{vocabulary, Mjcf};
 use crate::description::angle::{self, ROUNDING};
-use crate::description::{messages, LoopPoints, Noted, PoseCoordinate, WrittenCoupling, WrittenLoop};
+use crate::description::geometry::{unit, vector};
+use crate::description::{
+    messages, AnchoredJoint, Angle, AngleUnit, ClosingJoint, LoopPoints, Noted, Placement, PoseCoordinate, Rotation,
+    WrittenCoupling, WrittenJoint, WrittenLink, WrittenLoop, WrittenPose, WrittenTurn,
+};
 use straightline_core::Dd;
 
 impl<'s> Mjcf<'s> {
@@ -33,14 +37,14 @@ impl<'s> Mjcf<'s> {
                 let own = self.read_loop(&given);
                 self.robot.loops.extend(own);
             }
-            "weld" => {
-                let why = match self.is_moved_from_outside(element) {
-                    true => {
-                        "it pulls at a body that is moved from outside, which controls the robot and is no part of it"
-                    }
-                    false => "it holds two bodies together in all directions",
-                };
+            "weld" if self.is_moved_from_outside(element) => {
+                let why =
+                    "it pulls at a body that is moved from outside, which controls the robot and is no part of it";
                 self.refuse(element, "the equality", why, help);
+            }
+            "weld" => {
+                let own = self.read_weld(&given);
+                self.robot.loops.extend(own);
             }
             _ => self.refuse(element, "the equality", "it binds the motion", help),
         }
@@ -77,7 +81,7 @@ impl<'s> Mjcf<'s> {
                 LoopPoints::Anchor { links, point: self.vector(given, "anchor", owner, [0.0; 3]) }
             }
         };
-        Some(WrittenLoop { name, points, determines: Vec::new(), assembly: None, hinge: None })
+        Some(WrittenLoop { name, points, determines: Vec::new(), assembly: None, joint: ClosingJoint::Spherical })
     }
 
     /// q₁ − ref₁ = a₀ + a₁ (q₂ − ref₂).
@@ -88,8 +92,9 @@ impl<'s> Mjcf<'s> {
         let [a0, a1] = self.line(given, owner);
         let joint = self.joint_named(element, "joint1", owner);
         if given.attribute("joint2").is_none() {
-            let help = "remove the joint, which fixes it: the pose of its body says where";
-            self.refuse(element, owner, "without `joint2` it holds `joint1` where it is", help);
+            if let Some((joint, _)) = joint {
+                self.hold(&joint.value, a0, given);
+            }
             return;
         }
         let source = self.joint_named(element, "joint2", owner);
@@ -102,6 +107,42 @@ impl<'s> Mjcf<'s> {
             ratio: Noted::new(a1, place.clone()),
             offset: Noted::new(offset.to_f64(), place),
         });
+    }
+
+    /// Fixes a joint so far from where it is in the pose of the file \[rad or m\].
+    fn hold(&mut self, name: &str, displacement: f64, given: &Defaulted<'s>) {
+        let Some(k) = self.robot.joints.iter().position(|joint| joint.name.value == name) else { return };
+        let WrittenJoint { name, kind, parent, child, placement, .. } = self.robot.joints[k].clone();
+        let Placement::Anchored(AnchoredJoint { origin, anchor, axis, .. }) = placement else { return };
+        let place = given.attribute("polycoef").map_or_else(|| self.tag(given.element), |own| self.place(own));
+        let at = |xyz: [f64; 3], turns: Vec<WrittenTurn>| WrittenPose {
+            xyz: Noted::new(xyz, place.clone()),
+            rotation: Rotation::Turns(turns),
+        };
+        let mut poses = vec![origin];
+        if displacement != 0.0 && kind.value.kind.is_some_and(|kind| kind.turns()) {
+            let (text, unit) = (format!("{displacement:?}"), AngleUnit::Radian);
+            let angle = Angle { value: displacement, unit, text, place: place.clone() };
+            let turn = WrittenTurn::About { axis: axis.clone(), angle };
+            poses.extend([at(anchor.value, Vec::new()), at([0.0; 3], vec![turn])]);
+            poses.push(at(anchor.value.map(|x| 0.0 - x), Vec::new()));
+        } else if displacement != 0.0 {
+            let along = unit(vector(axis.value)).unwrap_or_else(|| vector([0.0; 3]));
+            let xyz = along.scale(Dd::from(displacement)).to_array().map(Dd::to_f64);
+            poses.push(at(xyz, Vec::new()));
+        }
+        let last = poses.pop().expect("there is the origin");
+        let (mut parent, mut chain) = (parent, Vec::new());
+        for pose in poses {
+            let next = Noted::new(self.names.made_up(&format!("{}_carrier", name.value)), place.clone());
+            self.robot.links.push(WrittenLink { name: next.clone(), inertial: None, is_carrier: true });
+            let fixed = Noted::new(self.names.made_up(&format!("{}_fixed", next.value)), place.clone());
+            chain.push(WrittenJoint::fixed(fixed, parent, next.clone(), pose));
+            parent = next;
+        }
+        chain.push(WrittenJoint::fixed(name, parent, child, last));
+        self.robot.joints.splice(k..=k, chain);
+        self.ignore_as("joint that an equality holds", given.element);
     }
 
     /// a₀ and a₁ of `polycoef`, or a complaint that there is more.

@@ -46,6 +46,10 @@ impl<'s> Mjcf<'s> {
                 joints.push(given);
                 continue;
             }
+            if self.held.as_ref() == Some(&contents.link().value) && is_alone {
+                self.ignore_as("free joint of a body that is welded to the world", element);
+                continue;
+            }
             let damping = self.read_free(&given, owner);
             if is_base {
                 self.robot.base_damping = damping;

@@ -21,6 +21,7 @@ mod joints;
 mod mesh;
 mod settings;
 mod vocabulary;
+mod welds;
 
 use super::reader::{FileReader, FreeNames};
 use super::{xml, Description, FileFormat, Noted, WrittenJoint};
@@ -54,6 +55,8 @@ struct Mjcf<'s> {
     /// Names of bodies and frames.
     links: HashSet<String>,
     robot: Description,
+    /// The body of the world that would move freely, and is welded to the world.
+    held: Option<String>,
     /// Of each joint of it, the element that says it.
     joints: Vec<&'s Element>,
 }
@@ -76,6 +79,7 @@ fn read(source: &Source, diagnostics: &mut Diagnostics) -> Option<Description> {
         names: FreeNames::default(),
         links: HashSet::new(),
         robot: Description::new(&FORMAT, name),
+        held: None,
         joints: Vec::new(),
     };
     mjcf.collect_names();

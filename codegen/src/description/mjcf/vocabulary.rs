@@ -32,5 +32,7 @@ pub(super) const OPTION: &str =
 pub(super) const EQUALITY: &str = "active class joint1 joint2 name polycoef solimp solref";
 /// Of a connection of two bodies.
 pub(super) const CONNECT: &str = "active anchor body1 body2 class name site1 site2 solimp solref";
+/// Of a weld of two bodies.
+pub(super) const WELD: &str = "active anchor body1 body2 class name relpose site1 site2 solimp solref torquescale";
 /// Of what attaches another model.
 pub(super) const ATTACH: &str = "body model prefix";

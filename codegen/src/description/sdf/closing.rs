@@ -7,7 +7,7 @@ use super::frames::WORLD;
 use super::joints::SdfJoint;
 use super::poses::PoseStep;
 use super::Sdf;
-use crate::description::{messages, JointType, LoopPoints, Noted, WrittenLink, WrittenLoop};
+use crate::description::{messages, ClosingJoint, JointType, LoopPoints, Noted, WrittenLink, WrittenLoop};
 use std::collections::{HashMap, VecDeque};
 
 impl SdfJoint<'_, '_> {
@@ -97,11 +97,13 @@ impl<'d, 'i> Sdf<'_, 'd, 'i> {
         }
     }
 
-    /// Adds what a closing joint says: points that coincide, of a hinge in the plane of its loop.
+    /// Adds what a closing joint says: points that coincide, of a hinge its axis.
     pub fn add_closing(&mut self, joint: &SdfJoint<'d, 'i>, first: &Noted<String>) {
-        let Some(kind) = &joint.kind else { return };
+        if joint.kind.is_none() {
+            return;
+        }
         let owner = self.owner_of(joint.frame);
-        if !joint.is_ball() && !joint.is_hinge() {
+        if !joint.is_ball() && !joint.is_hinge() && !joint.is_fixed() {
             let link = &self.frames[joint.bodies[1]].name.value;
             let complaint = messages::two_parents(link, &first.value, &joint.name.value);
             self.complain(&joint.name.place.span, complaint.related(&first.place, "the other joint"));
@@ -145,7 +147,11 @@ impl<'d, 'i> Sdf<'_, 'd, 'i> {
             points: LoopPoints::Anchor { links: [Some(link), other], point: Noted::new([0.0; 3], place) },
             determines: Vec::new(),
             assembly: None,
-            hinge: axis.filter(|_| kind.value.has_axis()).map(|axis| axis.xyz.clone()),
+            joint: match axis {
+                _ if joint.is_fixed() => ClosingJoint::Fixed,
+                Some(axis) => ClosingJoint::Revolute(axis.xyz.clone()),
+                None => ClosingJoint::Spherical,
+            },
         });
     }
 }

@@ -2,6 +2,7 @@
 
 use super::{Span, TomlTable};
 use crate::description::reader::{FileReader, Range64};
+use crate::description::toml::AXES;
 use crate::description::{
     messages, Angle, AngleUnit, JointDrive, JointLimits, Noted, Rotation, WrittenInertial, WrittenPose,
 };
@@ -24,6 +25,14 @@ pub const INERTIAL_KEYS: &[&str] = &[
 pub const DRIVE_KEYS: &[&str] = &["damping", "friction", "rotor_inertia", "gear_ratio", "armature", "spring"];
 
 impl FileReader<'_> {
+    /// An axis: a word for one of the frame's, or a vector.
+    pub fn axis_at(&mut self, table: &TomlTable, key: &str) -> Option<Noted<[f64; 3]>> {
+        match table.get(key) {
+            Some((DeValue::String(_), _)) => self.word_at(table, key, &AXES),
+            _ => self.vector_at(table, key),
+        }
+    }
+
     /// An inertia tensor: a table `{ xx, yy, zz, xy, xz, yz }`, three principal moments, or a 3×3 matrix.
     pub fn tensor_at(&mut self, table: &TomlTable, key: &str) -> Option<Noted<Sym3<f64>>> {
         const FORMS: &str = "`{ xx = …, yy = …, zz = …, xy = 0, xz = 0, yz = 0 }`, three moments or a 3×3 matrix";

@@ -14,7 +14,10 @@ use straightline_core::Dd;
 
 mod loops;
 
-pub use loops::{ASSEMBLIES, LOOPS, SOFT_LOOPS};
+pub use loops::{
+    ASSEMBLIES, DETERMINED_JOINTS, HINGED_LOOPS, HINGED_LOOPS_BESIDE_BALLS, LOOPS, LOOPS_AS_JOINTS, LOOPS_OPEN_AT_ZERO,
+    SOFT_LOOPS, WELDED_LOOPS,
+};
 
 /// So much more than the sum of the others a principal moment is by rounding.
 const SLACK: f64 = 1.0 + 1e-12;

@@ -4,11 +4,11 @@
 //! as it was.
 
 use super::rotations::{self, Said};
-use super::{attribute, losses, number, numbers, word_of, FormatWriter, JointForm, OnLinks};
+use super::{attribute, losses, number, numbers, word_of, FormatWriter, JointForm, LoopForm, OnLinks};
 use crate::description::angle::{self, ROUNDING};
 use crate::description::{
-    AnchoredJoint, Description, LoopPoints, Placement, Rotation, WrittenInertial, WrittenJoint, WrittenLink,
-    WrittenPose,
+    AnchoredJoint, ClosingJoint, Description, LoopPoints, Placement, Rotation, WrittenInertial, WrittenJoint,
+    WrittenLink, WrittenPose,
 };
 use std::fmt::Write;
 use straightline_core::joint::Dialect;
@@ -22,10 +22,12 @@ pub static WRITER: FormatWriter = FormatWriter {
     joints: JointForm::Anywhere,
     rotations: "roll, pitch and yaw in radians (`eulerseq=\"XYZ\"`) where IN has angles, quaternions otherwise",
     frames_are_links: false,
+    loops: LoopForm::Frames,
     losses: &[
         &losses::DRIVES,
         &losses::FLEXIBLE_LINKS,
         &losses::ASSEMBLIES,
+        &losses::HINGED_LOOPS,
         &losses::VELOCITY_LIMITS,
         &losses::ONE_SIDED_RANGES,
         &losses::ZERO_EFFORTS,
@@ -60,7 +62,8 @@ fn text(robot: &Description) -> String {
         for own in &robot.loops {
             let LoopPoints::Frames([one, other]) = &own.points else { unreachable!("loops are closed at frames") };
             let sites = attribute("site1", &one.value) + &attribute("site2", &other.value);
-            _ = writeln!(out, "    <connect{}{sites}/>", attribute("name", &own.name.value));
+            let element = if own.joint == ClosingJoint::Fixed { "weld" } else { "connect" };
+            _ = writeln!(out, "    <{element}{}{sites}/>", attribute("name", &own.name.value));
         }
         out += "  </equality>\n";
     }

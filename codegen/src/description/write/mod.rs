@@ -34,6 +34,8 @@ pub struct FormatWriter {
     pub rotations: &'static str,
     /// Whether links are all the frames that it has.
     pub frames_are_links: bool,
+    /// How it says closed loops.
+    pub loops: LoopForm,
     /// What it has no place for, or says in another way.
     pub losses: &'static [&'static Loss],
     /// Whether a robot that floats is read as that only if the reader is told.
@@ -54,6 +56,17 @@ pub enum JointForm {
     AtFrames,
     /// Anywhere in it.
     Anywhere,
+}
+
+/// How a format says closed loops.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum LoopForm {
+    /// Not at all.
+    Nowhere,
+    /// By two frames, wherever their joints stand, and with the joints that they determine.
+    Frames,
+    /// By a frame and what is there where all coordinates are zero; who reads it chooses the joints that they determine.
+    AtZero,
 }
 
 /// A robot with what stands on each of its links.

@@ -2,12 +2,12 @@
 
 use super::drives::of_drive;
 use super::edits::{TextEdit, TomlEdits};
-use super::{losses, number, rotations, word_of, FormatWriter, JointForm};
+use super::{losses, number, rotations, word_of, FormatWriter, JointForm, LoopForm};
 use crate::description::angle::{self, ROUNDING};
 use crate::description::flexible::{Bending, Flexible};
 use crate::description::{
-    AngleUnit, BaseKind, Description, JointDrive, LoopPoints, Noted, Placement, Rotation, WrittenInertial,
-    WrittenJoint, WrittenPose,
+    AngleUnit, BaseKind, ClosingJoint, Description, JointDrive, LoopPoints, Noted, Placement, Rotation,
+    WrittenInertial, WrittenJoint, WrittenPose,
 };
 use crate::diagnostic::{Place, Source};
 use std::fmt::Write;
@@ -21,6 +21,7 @@ pub static WRITER: FormatWriter = FormatWriter {
     joints: JointForm::AtFrames,
     rotations: "roll, pitch and yaw: in the unit of IN, or degrees if all are multiples of 30° or 45°, or radians",
     frames_are_links: false,
+    loops: LoopForm::Frames,
     losses: &[&losses::CARRIERS, &losses::JOINTS_BESIDE_FRAMES, &losses::SKIPPED],
     floats_by_option: false,
     text,
@@ -59,6 +60,12 @@ fn text(robot: &Description) -> String {
         let determines: Vec<String> = own.determines.iter().map(|joint| string(&joint.value)).collect();
         let name = string(&own.name.value);
         _ = writeln!(out, "\n[[loop]]\nname = {name}\nframe = {one}\nwith = {other}");
+        if own.joint != ClosingJoint::Spherical {
+            _ = writeln!(out, "kind = {}", string(own.joint.word()));
+        }
+        if let ClosingJoint::Revolute(axis) = &own.joint {
+            _ = writeln!(out, "axis = {:?}", axis.value);
+        }
         _ = writeln!(out, "determines = [{}]", determines.join(", "));
         if let Some(assembly) = &own.assembly {
             _ = writeln!(out, "assembly = {}", string(assembly.value.word()));

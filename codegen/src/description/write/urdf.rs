@@ -1,7 +1,7 @@
 //! URDF: links with their inertials, then joints. Frames are links without mass on fixed joints.
 
 use super::edits::{indentation, TextEdit};
-use super::{attribute, losses, number, numbers, rotations, word_of, FormatWriter, JointForm};
+use super::{attribute, losses, number, numbers, rotations, word_of, FormatWriter, JointForm, LoopForm};
 use crate::description::reader::FileReader;
 use crate::description::xml::{self, children};
 use crate::description::{
@@ -19,6 +19,7 @@ pub static WRITER: FormatWriter = FormatWriter {
     joints: JointForm::AtFrames,
     rotations: "roll, pitch and yaw in radians",
     frames_are_links: true,
+    loops: LoopForm::Nowhere,
     losses: &[
         &losses::SPRINGS,
         &losses::ROTORS,

@@ -1,21 +1,42 @@
-//! Robots with closed loops, by the second author: all three equations of every loop in world axes, solved by least squares in double-double, and forces
-//! by virtual work.
+//! Robots with closed loops, by the second author: all equations of every loop in world axes, solved by least squares in double-double, and forces by virtual
+//! work.
 //!
 //! The tree that is left where loops are cut has the independent coordinates first. Points that coincide have the same velocity and acceleration, so that
-//! (J₂ − J₁) ẋ = 0 and (J₂ − J₁) ẍ + (a₂ − a₁) = 0, a the accelerations at ẍ = 0; configurations are closed ones.
+//! (J₂ − J₁) ẋ = 0 and (J₂ − J₁) ẍ + (a₂ − a₁) = 0, a the accelerations at ẍ = 0; configurations are closed ones. So do angular velocities and
+//! accelerations of a weld, and across the axis n of a hinge: n × (ω₂ − ω₁) = 0, n × (α₂ − α₁) + (ω₁ × n) × (ω₂ − ω₁) = 0.
 
 use super::{list, Chapter, Truth};
 use crate::function::Quantity;
-use nalgebra::{DMatrix, DVector};
+use nalgebra::{DMatrix, DVector, Vector3};
 use straightline_core::magnitude::Magnitude;
 use straightline_core::reference::{self, CentreOfMassFrame, CentreOfMassTree, ReferenceReal};
 use straightline_core::{Dd, Dual, Real};
 
-/// Frames of the tree whose origins coincide, and how many velocity coordinates are independent.
+/// Frames of the tree whose origins coincide.
+#[derive(Clone, Debug)]
+pub struct ClosedMeeting<T> {
+    /// The frames.
+    pub ends: [CentreOfMassFrame<T>; 2],
+    /// How they turn against each other.
+    pub turning: Turning<T>,
+}
+
+/// How two bodies turn against each other.
+#[derive(Clone, Debug)]
+pub enum Turning<T> {
+    /// In any way.
+    Free,
+    /// About an axis of the first frame.
+    About(Vector3<T>),
+    /// Not at all.
+    None,
+}
+
+/// The loops of a robot, and how many velocity coordinates are independent.
 #[derive(Clone, Debug)]
 pub struct ClosedLoops {
-    /// The frames of each loop.
-    pub ends: Vec<[CentreOfMassFrame<Dd>; 2]>,
+    /// Where each loop closes.
+    pub meetings: Vec<ClosedMeeting<Dd>>,
     /// So many velocities stand before those that loops determine.
     pub independent: usize,
     /// So many equations programs have of them.
@@ -34,20 +55,41 @@ pub(super) struct TreeMotion<T> {
     pub bias: Vec<T>,
 }
 
+/// The axis of a hinge, in the world.
+fn axis_at<T: ClosingReal>(meeting: &ClosedMeeting<T>, tree: &CentreOfMassTree<T>, q: &[T]) -> Vector3<T> {
+    match &meeting.turning {
+        Turning::About(axis) => reference::frame_pose(tree, &meeting.ends[0], q).rotation * axis,
+        Turning::Free | Turning::None => Vector3::from_element(<T as Real>::zero()),
+    }
+}
+
 impl<T: ClosingReal> TreeMotion<T> {
     pub fn new(tree: &CentreOfMassTree<T>, loops: &ClosedLoops, [q, qd, qdd]: [&[T]; 3]) -> TreeMotion<T> {
-        let (ends, n, all) = (loops.ends_over(), loops.independent, tree.nv());
+        let (meetings, n, all) = (loops.meetings_over(), loops.independent, tree.nv());
         let zero = <T as Real>::zero();
-        let (map, closing) = loops.independent_motion(tree, &ends, q);
+        let (map, closing) = loops.independent_motion(tree, &meetings, q);
         let moved = |rates: &[T]| &map * DVector::from_column_slice(rates);
         let rates = moved(qd);
         let still = vec![zero; all];
-        let mut drift = DVector::from_element(3 * ends.len(), zero);
-        for (k, [one, other]) in ends.iter().enumerate() {
-            let [one, other] =
-                [one, other].map(|end| reference::frame_acceleration(tree, end, q, rates.as_slice(), &still));
-            drift.rows_mut(3 * k, 3).copy_from(&(one.rows(0, 3) - other.rows(0, 3)));
+        let mut drift = Vec::new();
+        for meeting in &meetings {
+            let of_ends = meeting.ends.each_ref();
+            let [one, other] = of_ends.map(|end| reference::frame_acceleration(tree, end, q, rates.as_slice(), &still));
+            drift.extend((one.fixed_rows::<3>(0) - other.fixed_rows::<3>(0)).iter().copied());
+            let velocities = of_ends.map(|end| reference::frame_velocity(tree, end, q, rates.as_slice()));
+            let [turn, other_turn] = velocities.map(|velocity| velocity.fixed_rows::<3>(3).into_owned());
+            let turning = (other - one).fixed_rows::<3>(3).into_owned();
+            let leaning = match meeting.turning {
+                Turning::Free => continue,
+                Turning::None => turning,
+                Turning::About(_) => {
+                    let axis = axis_at(meeting, tree, q);
+                    axis.cross(&turning) + turn.cross(&axis).cross(&(other_turn - turn))
+                }
+            };
+            drift.extend(leaning.iter().map(|x| -*x));
         }
+        let drift = DVector::from_vec(drift);
         let mut bias = DVector::from_element(all, zero);
         bias.rows_mut(n, all - n).copy_from(&closing.solved(&drift));
         let accelerations = moved(qdd) + &bias;
@@ -58,26 +100,45 @@ impl<T: ClosingReal> TreeMotion<T> {
 impl ClosedLoops {
     /// ∂ẋ/∂q̇.
     pub(super) fn map_at<T: ClosingReal>(&self, tree: &CentreOfMassTree<T>, q: &[T]) -> DMatrix<T> {
-        self.independent_motion(tree, &self.ends_over(), q).0
+        self.independent_motion(tree, &self.meetings_over(), q).0
     }
 
-    fn ends_over<T: ClosingReal>(&self) -> Vec<[CentreOfMassFrame<T>; 2]> {
-        self.ends.iter().map(|ends| ends.each_ref().map(|end| end.map(T::constant))).collect()
+    fn meetings_over<T: ClosingReal>(&self) -> Vec<ClosedMeeting<T>> {
+        let over = |meeting: &ClosedMeeting<Dd>| ClosedMeeting {
+            ends: meeting.ends.each_ref().map(|end| end.map(T::constant)),
+            turning: match &meeting.turning {
+                Turning::Free => Turning::Free,
+                Turning::About(axis) => Turning::About(axis.map(T::constant)),
+                Turning::None => Turning::None,
+            },
+        };
+        self.meetings.iter().map(over).collect()
     }
 
     /// ∂ẋ/∂q̇, and what solves for dependent rates.
     fn independent_motion<T: ClosingReal>(
         &self,
         tree: &CentreOfMassTree<T>,
-        ends: &[[CentreOfMassFrame<T>; 2]],
+        meetings: &[ClosedMeeting<T>],
         q: &[T],
     ) -> (DMatrix<T>, Closing<T>) {
         let (n, all) = (self.independent, tree.nv());
-        let mut rows = DMatrix::from_element(3 * ends.len(), all, <T as Real>::zero());
-        for (k, [one, other]) in ends.iter().enumerate() {
-            let [one, other] = [one, other].map(|end| reference::frame_jacobian(tree, end, q));
-            rows.rows_mut(3 * k, 3).copy_from(&(other.rows(0, 3) - one.rows(0, 3)));
+        let mut by_loop = Vec::new();
+        for meeting in meetings {
+            let [one, other] = meeting.ends.each_ref().map(|end| reference::frame_jacobian(tree, end, q));
+            let apart = other - one;
+            by_loop.extend((0..3).map(|i| apart.row(i).into_owned()));
+            match meeting.turning {
+                Turning::Free => {}
+                Turning::None => by_loop.extend((3..6).map(|i| apart.row(i).into_owned())),
+                Turning::About(_) => {
+                    let [x, y, z] = axis_at(meeting, tree, q).into();
+                    let [a, b, c] = [3, 4, 5].map(|i| apart.row(i).into_owned());
+                    by_loop.extend([&c * y - &b * z, &a * z - &c * x, &b * x - &a * y]);
+                }
+            }
         }
+        let rows = DMatrix::from_rows(&by_loop);
         let closing = Closing::new(rows.columns(n, all - n).into_owned());
         let mut map = DMatrix::from_fn(all, n, |i, j| T::constant(if i == j { Dd::ONE } else { Dd::ZERO }));
         for j in 0..n {
@@ -98,7 +159,7 @@ pub struct ClosedMotion<'a> {
     pub unaccelerated: Chapter<'a>,
     /// ∂ẋ/∂q̇.
     map: DMatrix<Magnitude>,
-    /// Equations that are asked for, three or two of a loop.
+    /// Equations that are asked for, as many as programs have.
     pub equations: usize,
 }
 

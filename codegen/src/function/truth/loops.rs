@@ -13,7 +13,10 @@ impl Truth for CloseLoops {
     /// A closed configuration stays as it is.
     fn truth_on_loops(at: &ClosedMotion<'_>) -> Option<Vec<Magnitude>> {
         let closed = Magnitude::new(Dd::ZERO).of_size(at.reach());
-        Some(at.tree.q().iter().copied().chain((0..at.equations).map(|_| closed)).collect())
+        // a coordinate near zero is known as well as points of the robot are
+        let known = at.reach().min(1.0);
+        let stays = at.tree.q().iter().map(|q| q.of_size(q.size.hypot(known)));
+        Some(stays.chain((0..at.equations).map(|_| closed)).collect())
     }
 }
 

@@ -28,7 +28,7 @@ mod tangent;
 mod tasks;
 mod whole;
 
-pub use closed::{ClosedLoops, ClosedMotion};
+pub use closed::{ClosedLoops, ClosedMeeting, ClosedMotion, Turning};
 use closed::{ClosingReal, TreeMotion};
 pub use effect::Effect;
 

@@ -35,7 +35,7 @@ pub(super) struct PlaneLoop<T> {
 impl<T: Real> PlaneLoop<T> {
     /// `None` of other loops, and of those with joints that follow others.
     pub fn new(whole: &Model<T>, of: &ClosedLoop<T>, y: &[T]) -> Option<Self> {
-        let [one, other] = of.directions[..] else { return None };
+        let ([one, other], []) = (&of.directions[..], &of.alignments[..]) else { return None };
         let alone = Mechanism::new(whole, of);
         let is_hinge = |b: &BodyId| whole.bodies[*b].joint.kind.turns() && whole.coupling_of(*b).is_none();
         if !alone.bodies.iter().all(is_hinge) {
@@ -62,7 +62,7 @@ impl<T: Real> PlaneLoop<T> {
             (0..path.len()).map(|k| link(end, &path, k)).collect::<Vec<_>>()
         });
         paths[0].iter_mut().for_each(|link| link.vector = -link.vector);
-        Some(PlaneLoop { paths, directions: [one, other] })
+        Some(PlaneLoop { paths, directions: [*one, *other] })
     }
 
     fn in_plane(&self, v: Vec3<T>) -> [T; 2] {

@@ -6,13 +6,13 @@ use crate::description::geometry::{compose, vector};
 use crate::description::reader::FreeNames;
 use crate::description::write::{pose_of, word_of, OnLinks};
 use crate::description::{
-    AnchoredJoint, Description, Noted, Placement, WrittenCoupling, WrittenInertial, WrittenJoint, WrittenLink,
-    WrittenPose,
+    AnchoredJoint, ClosingJoint, Description, LoopPoints, Noted, Placement, WrittenCoupling, WrittenInertial,
+    WrittenJoint, WrittenLink, WrittenPose,
 };
 use crate::diagnostic::Place;
 use std::collections::{HashMap, HashSet};
 use std::f64::consts::TAU;
-use straightline_core::joint::Dialect;
+use straightline_core::joint::{Dialect, JointKind, KINDS};
 use straightline_core::spatial::{Mat3, Sym3, Transform};
 use straightline_core::Dd;
 
@@ -36,6 +36,19 @@ pub enum ModelItem<'a> {
     Link(&'a WrittenLink, PosedOn<'a>),
     Frame(&'a str, PosedOn<'a>),
     Joint(Box<JointElement<'a>>),
+    /// A joint that closes a loop.
+    Closing(ClosingElement<'a>),
+}
+
+/// A joint that closes a loop: between two links or frames.
+pub struct ClosingElement<'a> {
+    pub name: &'a str,
+    pub word: &'static str,
+    /// The link or frame that carries it; `None`: the world.
+    pub parent: Option<&'a str>,
+    pub child: &'a str,
+    /// Of a hinge, in the axes of the child.
+    pub axis: Option<[f64; 3]>,
 }
 
 /// Where something stands: on a link or frame that is written, or in the world, by poses one after the other.
@@ -165,7 +178,36 @@ impl<'a> ModelTree<'a> {
                 self.add_on(link, &at, &mut open, &mut items);
             }
         }
+        self.add_closing(&mut items);
         items
+    }
+
+    /// Adds the joints that close loops, after those that carry.
+    fn add_closing(&self, items: &mut Vec<ModelItem<'a>>) {
+        let robot = self.on.robot;
+        let of_world = |item: &ModelItem<'a>| match item {
+            ModelItem::Frame(name, PosedOn { on: None, .. }) => Some(*name),
+            _ => None,
+        };
+        let mut of_world: HashSet<&str> = items.iter().filter_map(of_world).collect();
+        of_world.extend(robot.ground().map(|ground| ground.name.value.as_str()));
+        for own in &robot.loops {
+            let LoopPoints::Anchor { links: [Some(one), Some(other)], .. } = &own.points else {
+                unreachable!("loops close where coordinates are zero")
+            };
+            let [one, other] = [one, other].map(|end| end.value.as_str());
+            let (child, parent) = if of_world.contains(one) { (other, one) } else { (one, other) };
+            let axis = if let ClosingJoint::Revolute(axis) = &own.joint { Some(axis.value) } else { None };
+            // a hinge or a ball joint
+            let is_meant = |kind: &JointKind| match axis {
+                Some(_) => kind.is_single() && kind.turns() && !kind.slides(),
+                None => !kind.is_single() && !kind.is_base(),
+            };
+            let kind = KINDS.iter().copied().find(is_meant);
+            let word = word_of(kind, false, Dialect::Sdf).expect("the format has balls and hinges");
+            let parent = Some(parent).filter(|parent| !of_world.contains(parent));
+            items.push(ModelItem::Closing(ClosingElement { name: &own.name.value, word, parent, child, axis }));
+        }
     }
 
     /// Adds the frames on a link, and its joints to what is still to be added.

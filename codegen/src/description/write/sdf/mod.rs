@@ -7,11 +7,11 @@ mod items;
 pub(super) mod names;
 
 use super::rotations::{self, Said};
-use super::{attribute, escaped, losses, number, numbers, of_length_one, FormatWriter, JointForm};
+use super::{attribute, escaped, losses, number, numbers, of_length_one, FormatWriter, JointForm, LoopForm};
 use crate::description::sdf::NO_LIMIT;
 use crate::description::{Description, Noted, WrittenCoupling, WrittenInertial, WrittenJoint, WrittenPose};
 pub(super) use items::{carriers, links_as_frames};
-use items::{ends_of, entries, parts_of, JointElement, ModelItem, ModelTree, PosedOn};
+use items::{ends_of, entries, parts_of, ClosingElement, JointElement, ModelItem, ModelTree, PosedOn};
 use std::collections::HashMap;
 use std::fmt::Write;
 use straightline_core::spatial::Sym3;
@@ -23,18 +23,24 @@ pub static WRITER: FormatWriter = FormatWriter {
     joints: JointForm::Anywhere,
     rotations: "roll, pitch and yaw in radians where IN has angles, quaternions (`quat_xyzw`) otherwise",
     frames_are_links: false,
+    loops: LoopForm::AtZero,
     losses: &[
         &losses::ROTORS,
         &losses::DAMPED_BALLS,
         &losses::DAMPED_BASE,
         &losses::DRIVES,
-        &losses::LOOPS,
+        &losses::WELDED_LOOPS,
+        &losses::HINGED_LOOPS_BESIDE_BALLS,
+        &losses::LOOPS_OPEN_AT_ZERO,
+        &losses::ASSEMBLIES,
+        &losses::DETERMINED_JOINTS,
         &losses::FLEXIBLE_LINKS,
         &losses::ENDLESS_LIMITS,
         &losses::UNFIT_NAMES,
         &losses::BODIES_OF_MASS_ZERO,
         &losses::INERTIAS_OUT_OF_BOUNDS,
         &losses::MASS_OF_THE_WORLD,
+        &losses::LOOPS_AS_JOINTS,
         &losses::CARRIERS_OF_OTHERS,
         &losses::LINKS_AS_FRAMES,
         &losses::SKIPPED,
@@ -178,7 +184,22 @@ impl XmlLines {
                 }
                 self.close("joint");
             }
+            ModelItem::Closing(closing) => self.add_closing(closing),
         }
+    }
+
+    /// A joint that closes a loop, in the frame of its child.
+    fn add_closing(&mut self, closing: &ClosingElement) {
+        let ClosingElement { name, word, parent, child, axis } = closing;
+        self.open(&format!("joint{}{}", attribute("name", name), attribute("type", word)));
+        self.line("parent", &parent.map_or("world".to_string(), escaped));
+        self.line("child", &escaped(child));
+        if let Some(axis) = axis {
+            self.open(AXES[0]);
+            self.line("xyz", &numbers(&of_length_one(*axis)));
+            self.close(AXES[0]);
+        }
+        self.close("joint");
     }
 
     /// Mass, centre of mass and inertia; zeros where there is none, as the format takes what is left out for 1 kg and 1 kg·m².

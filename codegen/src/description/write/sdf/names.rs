@@ -9,7 +9,7 @@ use std::collections::{HashMap, HashSet};
 
 /// A name that something cannot have in SDF.
 pub struct UnfitName {
-    /// What has it: `robot`, `link`, `frame` or `joint`.
+    /// What has it: `robot`, `link`, `frame`, `joint` or `loop`.
     pub of: &'static str,
     pub name: Noted<String>,
     /// What it is called instead.
@@ -22,10 +22,11 @@ pub fn unfit(robot: &Description) -> Vec<UnfitName> {
     let links = robot.links.iter().map(|link| &link.name).filter(|name| Some(name.value.as_str()) != ground);
     let frames = robot.frames.iter().map(|frame| ("frame", &frame.name, Some(frame.link.value.as_str()) == ground));
     let joints = robot.joints.iter().map(|joint| ("joint", &joint.name, false));
+    let loops = robot.loops.iter().map(|own| ("loop", &own.name, false));
     let mut names = FreeNames::default();
     let mut taken: HashSet<&str> = HashSet::new();
     let mut left = Vec::new();
-    for (of, name, is_in_world) in links.map(|name| ("link", name, false)).chain(frames).chain(joints) {
+    for (of, name, is_in_world) in links.map(|name| ("link", name, false)).chain(frames).chain(joints).chain(loops) {
         // what stands in the world stands beside the model
         let is_free = !(is_in_world && name.value == robot.name.value) && taken.insert(&name.value);
         match is_free && is_fit(&name.value) {
@@ -51,7 +52,7 @@ fn is_fit(name: &str) -> bool {
     !is_reserved && name.trim() == name && !name.contains("::")
 }
 
-/// Gives a robot the other names. It has no loops, drives and links that bend any more.
+/// Gives a robot the other names. It has no drives and links that bend any more, and its loops determine the joints that a reader chooses.
 pub fn replace_unfit(robot: &mut Description) {
     let unfit = unfit(robot);
     let renamed = |of: &str, names: Vec<&mut Noted<String>>| {
@@ -69,6 +70,10 @@ pub fn replace_unfit(robot: &mut Description) {
     let on_frames = robot.frames.iter_mut().map(|frame| &mut frame.link);
     renamed("link", robot.links.iter_mut().map(|link| &mut link.name).chain(on_joints).chain(on_frames).collect());
     renamed("frame", robot.frames.iter_mut().map(|frame| &mut frame.name).collect());
+    for of in ["link", "frame"] {
+        renamed(of, robot.loops.iter_mut().flat_map(|own| own.points.names_mut()).collect());
+    }
+    renamed("loop", robot.loops.iter_mut().map(|own| &mut own.name).collect());
     let coupled = robot.couplings.iter_mut().flat_map(|coupling| [&mut coupling.joint, &mut coupling.source]);
     renamed("joint", robot.joints.iter_mut().map(|joint| &mut joint.name).chain(coupled).collect());
 }
