@@ -6,6 +6,7 @@ mod chain;
 mod command_line;
 mod diagnostics;
 mod drive_parameters;
+mod energies;
 mod export;
 #[cfg(feature = "parquet")]
 mod fuzz;
