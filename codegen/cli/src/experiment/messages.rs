@@ -106,10 +106,11 @@ pub fn time_goes_back(time: f64, before: f64) -> D {
         .help("rows are in the order of time, each later than the one before")
 }
 
-/// A list of another length than that of the joints.
-pub fn one_per_joint(what: &str, found: usize, joints: &[&str]) -> D {
-    D::error("one-per-joint", format!("{what}: {found} numbers for {} joints", joints.len()))
-        .help(format!("in the order {}", list(joints)))
+/// A list of another length than that of the joints, or of the entries of those with several coordinates.
+pub fn one_per_joint(what: &str, found: usize, entries: &[String]) -> D {
+    let entries: Vec<&str> = entries.iter().map(String::as_str).collect();
+    D::error("one-per-joint", format!("{what}: {found} numbers for {} coordinates", entries.len()))
+        .help(format!("in the order {}", list(&entries)))
 }
 
 /// A number outside of its range.

@@ -2,9 +2,7 @@
 
 use super::messages as say;
 use super::samples::{self, Columns};
-use super::{
-    contact, drive_inputs, gains, moving, names, sampled_motion, torques, zero, Experiment, ReadFile, COULOMB_SPEED,
-};
+use super::{contact, drive_inputs, gains, names, sampled_motion, torques, zero, Experiment, ReadFile, COULOMB_SPEED};
 use straightline_codegen::description::messages::unknown_frame;
 use straightline_codegen::description::reader::{FileReader, Range64};
 use straightline_codegen::description::table::{parse, TomlTable};
@@ -185,8 +183,11 @@ impl ExperimentReader<'_> {
                     return Some(all);
                 }
                 if found != n {
-                    let names = if key == "q" { names(self.model) } else { moving(self.model) };
-                    self.reader.complain(&span, say::one_per_joint(&what, found, &names));
+                    let order = usize::from(key != "q");
+                    let joints =
+                        self.model.joints().into_iter().filter(|joint| order == 0 || joint.iv < self.model.nv());
+                    let entries: Vec<String> = joints.flat_map(|joint| joint.entry_names(order)).collect();
+                    self.reader.complain(&span, say::one_per_joint(&what, found, &entries));
                     return Some(Vec::new());
                 }
                 Some(numbers)
