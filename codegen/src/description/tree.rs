@@ -427,6 +427,16 @@ pub struct JointLimits {
     pub effort: Option<Noted<f64>>,
 }
 
+impl JointLimits {
+    /// A number from which on a limit of URDF or SDF is none: `libsdformat` takes it so, and readers of URDF in C++ refuse `inf`.
+    pub(super) const NONE: f64 = 1e16;
+
+    /// Whether a number is a limit in URDF and SDF.
+    pub(super) fn is_limit(x: f64) -> bool {
+        x.abs() < Self::NONE
+    }
+}
+
 /// What the drive of a joint adds to its dynamics, where the file gives it.
 #[derive(Clone, Debug, PartialEq, Default)]
 pub struct JointDrive {

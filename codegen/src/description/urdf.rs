@@ -431,7 +431,11 @@ fn read_limits(reader: &mut FileReader, owner: &str, node: Node) -> JointLimits 
     check_attributes(reader, owner, node, &known);
     let mut read = |name: &str| {
         let attribute = node.attribute_node(name)?;
-        number(reader, &format!("{name} limit of {owner}"), attribute, Range64::Limit)
+        let mut limit = number(reader, &format!("{name} limit of {owner}"), attribute, Range64::Limit)?;
+        if !JointLimits::is_limit(limit.value) {
+            limit.value = f64::INFINITY.copysign(limit.value);
+        }
+        Some(limit)
     };
     let (mut lower, mut upper) = (read("lower"), read("upper"));
     let (velocity, effort) = (read("velocity"), read("effort"));

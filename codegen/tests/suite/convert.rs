@@ -150,6 +150,39 @@ fn random_robots_of_every_notation_are_the_same_in_every_format() {
     }
 }
 
+/// `urdfdom`, by which ROS and Pinocchio read, refuses `inf`, and limits without a greatest effort and speed.
+#[test]
+fn limits_of_urdf_are_numbers_that_other_readers_take() {
+    let link = |name: &str| format!("[[link]]\nname = \"{name}\"\nmass = 1.0\ninertia = [1.0, 1.0, 1.0]\n");
+    let joint = |kind: &str, limits: &str, parent: &str, child: &str| {
+        let ends = format!("kind = \"{kind}\"\nparent = \"{parent}\"\nchild = \"{child}\"\naxis = \"z\"");
+        format!("{}[[joint]]\nname = \"j_{child}\"\n{ends}\n{limits}\n", link(child))
+    };
+    let joints = [
+        ("prismatic", ""),
+        ("prismatic", "limits = { lower = -0.5 }"),
+        ("revolute", "limits = { upper = 2.0, effort = 9.0 }"),
+        ("revolute", "limits = { lower = -1.0, upper = 2.0, velocity = 3.0 }"),
+        ("continuous", "limits = { velocity = 4.0 }"),
+        ("continuous", ""),
+    ];
+    let mut text = format!("[robot]\nname = \"arm\"\n{}", link("l0"));
+    for (k, (kind, limits)) in joints.iter().enumerate() {
+        text += &joint(kind, limits, &format!("l{k}"), &format!("l{}", k + 1));
+    }
+    let written = there_and_back("limits", &Source::new("arm.toml", text), ConvertOptions::default());
+    let (_, urdf) = written.iter().find(|(to, _)| *to == "urdf").expect("URDF says all of it");
+    let limits: Vec<&str> = urdf.lines().map(str::trim).filter(|line| line.starts_with("<limit")).collect();
+    let expected = [
+        r#"<limit lower="-1e16" upper="1e16" effort="1e16" velocity="1e16"/>"#,
+        r#"<limit lower="-0.5" upper="1e16" effort="1e16" velocity="1e16"/>"#,
+        r#"<limit lower="-1e16" upper="2" effort="9" velocity="1e16"/>"#,
+        r#"<limit lower="-1" upper="2" effort="1e16" velocity="3"/>"#,
+        r#"<limit effort="1e16" velocity="4"/>"#,
+    ];
+    assert_eq!(limits, expected);
+}
+
 /// Of a greatest effort below zero the magnitude is read, and written.
 #[test]
 fn limits_below_zero_are_written_as_they_are_read() {
@@ -350,6 +383,13 @@ fn what_a_format_cannot_say_is_listed_and_nothing_else() {
         (
             "limits from 10¹⁶ on",
             "sdf",
+            arm("limits = { effort = 1e16 }", "", ""),
+            "joint `shoulder` (line 17)",
+            "left-out",
+        ),
+        (
+            "limits from 10¹⁶ on",
+            "urdf",
             arm("limits = { effort = 1e16 }", "", ""),
             "joint `shoulder` (line 17)",
             "left-out",

@@ -6,9 +6,6 @@ use crate::description::xml::{children, tag};
 use crate::description::{messages, JointDrive, JointLimits, Noted};
 use roxmltree::Node;
 
-/// From here on a limit is none.
-pub(in crate::description) const NO_LIMIT: f64 = 1e16;
-
 /// An axis as it is written.
 pub(super) struct SdfAxis<'d, 'i> {
     /// Its direction.
@@ -62,7 +59,7 @@ impl<'d, 'i> Sdf<'_, 'd, 'i> {
         let found = self.pick(&owner, element, names);
         let mut read = |k: usize| {
             let limit = self.number(found[k]?, &format!("{} {owner}", names[k]), Range64::Limit)?;
-            Some(limit).filter(|limit| limit.value.abs() < NO_LIMIT)
+            Some(limit).filter(|limit| JointLimits::is_limit(limit.value))
         };
         let (lower, upper) = (read(0), read(1));
         let mut greatest = |k: usize| read(k).filter(|limit| limit.value >= 0.0);

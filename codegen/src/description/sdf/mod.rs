@@ -18,8 +18,6 @@ mod joints;
 mod links;
 mod poses;
 
-pub(super) use axes::NO_LIMIT;
-
 use super::reader::{FileReader, FreeNames};
 use super::xml::{self, children, tag, Span};
 use super::{messages, BaseKind, Description, FileFormat, Noted};

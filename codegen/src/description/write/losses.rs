@@ -210,13 +210,15 @@ pub static INERTIAS_OUT_OF_BOUNDS: Loss = Loss {
     remove: |_| (),
 };
 
-/// Limits that SDF takes for none.
+/// Limits that URDF and SDF take for none.
 pub static ENDLESS_LIMITS: Loss = Loss {
     what: "limits from 10¹⁶ on",
     weight: Data,
     then: "there they mean that there is none",
     find: |robot| {
-        let far = |x: &&Option<Noted<f64>>| x.as_ref().is_some_and(|x| x.value.is_finite() && !sdf::is_limit(x.value));
+        let far = |x: &&Option<Noted<f64>>| {
+            x.as_ref().is_some_and(|x| x.value.is_finite() && !JointLimits::is_limit(x.value))
+        };
         of_joints(robot, |joint| {
             let JointLimits { lower, upper, velocity, effort } = &joint.limits;
             first([lower, upper, velocity, effort].into_iter().filter(far))
@@ -228,7 +230,10 @@ pub static ENDLESS_LIMITS: Loss = Loss {
             let ends =
                 [(lower, -f64::INFINITY), (upper, f64::INFINITY), (velocity, f64::INFINITY), (effort, f64::INFINITY)];
             for (limit, endless) in ends {
-                limit.iter_mut().filter(|limit| !sdf::is_limit(limit.value)).for_each(|limit| limit.value = endless);
+                limit
+                    .iter_mut()
+                    .filter(|limit| !JointLimits::is_limit(limit.value))
+                    .for_each(|limit| limit.value = endless);
             }
         }
     },

@@ -27,6 +27,7 @@ pub static WRITER: FormatWriter = FormatWriter {
         &losses::DRIVES,
         &losses::LOOPS,
         &losses::FLEXIBLE_LINKS,
+        &losses::ENDLESS_LIMITS,
         &losses::BALL_JOINTS,
         &losses::FLOATING_BASE,
         &losses::DAMPED_BASE,
@@ -108,20 +109,25 @@ fn of_joint(joint: &WrittenJoint, robot: &Description) -> String {
     out + "  </joint>\n"
 }
 
-/// Both ends of a range, of which one may be infinite: a limit that is left out is 0 in this format. Joints that slide always have a range.
+/// Both ends of a range, as one that is left out is 0 in this format, and both greatest values: `urdfdom`, which ROS, Pinocchio and others read by, refuses an
+/// element without them. What has no limit has [`JointLimits::NONE`]. Joints that slide always have a range.
 fn of_limits(limits: &JointLimits, is_ranged: bool, word: &str) -> String {
     let needs_range = JointType::words(Dialect::Urdf).iter().any(|(known, t)| *known == word && t.has_range);
-    let value = |limit: &Option<Noted<f64>>| limit.as_ref().map(|limit| limit.value);
-    let end = |limit: &Option<Noted<f64>>, otherwise: f64| {
-        needs_range.then(|| value(limit).filter(|_| is_ranged).unwrap_or(otherwise))
+    if !needs_range && limits.effort.is_none() && limits.velocity.is_none() {
+        return String::new();
+    }
+    let none = JointLimits::NONE;
+    let value = |limit: &Option<Noted<f64>>, otherwise: f64| {
+        limit.as_ref().map_or(otherwise, |limit| limit.value.clamp(-none, none))
     };
+    let [lower, upper] = if is_ranged { [&limits.lower, &limits.upper] } else { [&None, &None] };
     element(
         "limit",
         &[
-            ("lower", end(&limits.lower, f64::NEG_INFINITY)),
-            ("upper", end(&limits.upper, f64::INFINITY)),
-            ("effort", value(&limits.effort)),
-            ("velocity", value(&limits.velocity)),
+            ("lower", needs_range.then(|| value(lower, -none))),
+            ("upper", needs_range.then(|| value(upper, none))),
+            ("effort", Some(value(&limits.effort, none))),
+            ("velocity", Some(value(&limits.velocity, none))),
         ],
     )
 }

@@ -1,13 +1,12 @@
 //! What an SDF of a robot holds: links, frames and joints in their order, as the format has them.
 
-use super::is_limit;
 use crate::description::angle::{transform, ROUNDING};
 use crate::description::geometry::{compose, vector};
 use crate::description::reader::FreeNames;
 use crate::description::write::{pose_of, word_of, OnLinks};
 use crate::description::{
-    AnchoredJoint, ClosingJoint, Description, LoopPoints, Noted, Placement, WrittenCoupling, WrittenInertial,
-    WrittenJoint, WrittenLink, WrittenPose,
+    AnchoredJoint, ClosingJoint, Description, JointLimits, LoopPoints, Noted, Placement, WrittenCoupling,
+    WrittenInertial, WrittenJoint, WrittenLink, WrittenPose,
 };
 use crate::diagnostic::Place;
 use std::collections::{HashMap, HashSet};
@@ -359,7 +358,7 @@ impl<'a> JointElement<'a> {
 /// The ends of a range, as far as it has them.
 pub fn ends_of(joint: &WrittenJoint) -> [(&'static str, Option<f64>); 2] {
     let end = |limit: &Option<Noted<f64>>| {
-        limit.as_ref().map(|limit| limit.value).filter(|x| joint.kind.value.has_range && is_limit(*x))
+        limit.as_ref().map(|limit| limit.value).filter(|x| joint.kind.value.has_range && JointLimits::is_limit(*x))
     };
     [("lower", end(&joint.limits.lower)), ("upper", end(&joint.limits.upper))]
 }

@@ -8,8 +8,9 @@ pub(super) mod names;
 
 use super::rotations::{self, Said};
 use super::{attribute, escaped, losses, number, numbers, of_length_one, FormatWriter, JointForm, LoopForm};
-use crate::description::sdf::NO_LIMIT;
-use crate::description::{Description, Noted, WrittenCoupling, WrittenInertial, WrittenJoint, WrittenPose};
+use crate::description::{
+    Description, JointLimits, Noted, WrittenCoupling, WrittenInertial, WrittenJoint, WrittenPose,
+};
 pub(super) use items::{carriers, links_as_frames};
 use items::{ends_of, entries, parts_of, ClosingElement, JointElement, ModelItem, ModelTree, PosedOn};
 use std::collections::HashMap;
@@ -54,11 +55,6 @@ pub static WRITER: FormatWriter = FormatWriter {
 const VERSIONS: [&str; 2] = ["1.9", "1.11"];
 /// Gravity of a robot that says nothing of it \[m/s²\].
 const GRAVITY: [f64; 3] = [0.0, 0.0, -9.81];
-
-/// Whether a limit is one.
-pub(super) fn is_limit(x: f64) -> bool {
-    x.abs() < NO_LIMIT
-}
 
 fn text(robot: &Description) -> String {
     let tree = ModelTree::of(robot);
@@ -219,7 +215,8 @@ impl XmlLines {
         let Some((_, _, xyz)) = parts_of(joint) else { return };
         self.open(name);
         self.line("xyz", &numbers(&of_length_one(xyz)));
-        let limit = |limit: &Option<Noted<f64>>| limit.as_ref().map(|limit| limit.value).filter(|x| is_limit(*x));
+        let limit =
+            |limit: &Option<Noted<f64>>| limit.as_ref().map(|limit| limit.value).filter(|x| JointLimits::is_limit(*x));
         let [lower, upper] = ends_of(joint);
         let greatest = [("effort", limit(&joint.limits.effort)), ("velocity", limit(&joint.limits.velocity))];
         self.group("limit", &[lower, upper, greatest[0], greatest[1]]);
