@@ -432,9 +432,10 @@ fn meshes_have_the_inertia_of_what_they_enclose() {
         model_of(&folder.join("robot.xml").to_string_lossy(), &text)
     };
     let solid = with("type=\"box\" size=\"0.1 0.2 0.3\" pos=\"1 2 3\"", "box.obj");
-    same(&solid, &with("type=\"mesh\" mesh=\"m\"", "box.obj"), 1e-14);
-    // the corners in f32
-    same(&solid, &with("type=\"mesh\" mesh=\"m\"", "box.stl"), 1e-6);
+    // corners are f32 in both formats
+    let mesh = |file: &str| with("type=\"mesh\" mesh=\"m\"", file);
+    same(&solid, &mesh("box.stl"), 1e-6);
+    same(&mesh("box.stl"), &mesh("box.obj"), 1e-14);
     // a box of which a corner is pushed in: parts of its volume have the other sign, seen from the centroid of its surface
     let mut lines: Vec<String> =
         std::fs::read_to_string(folder.join("box.obj")).expect("it is there").lines().map(str::to_string).collect();
@@ -451,6 +452,27 @@ fn meshes_have_the_inertia_of_what_they_enclose() {
     assert!((mass(&legacy) / mass(&exact) - 1.0).abs() > 1e-3, "{} {}", mass(&legacy), mass(&exact));
     same(&exact, &dented("exactmeshinertia=\"true\"", ""), 1e-14);
     same(&legacy, &dented("exactmeshinertia=\"true\"", "inertia=\"legacy\""), 1e-14);
+    std::fs::remove_dir_all(&folder).expect("it was made here");
+}
+
+/// Mass and centre of mass that MuJoCo 4.0.0 has: of a skew box by faces of four corners, three of which the other diagonal divides, in coordinates of f32.
+#[test]
+fn the_shorter_diagonal_divides_faces_of_four_corners() {
+    let folder = folder("quads");
+    let obj = "v 0 0 0\nv 0.01 -0.02 0.12\nv -0.01 0.11 0.02\nv 0.02 0.09 0.1\nv 0.11 0.02 -0.01\nv 0.09 0.01 0.08\nv 0.1 0.12 0.01\nv 0.13 0.1 0.09\n\
+               f 1 2 4 3\nf 5 7 8 6\nf 1 5 6 2\nf 3 4 8 7\nf 1 3 7 5\nf 2 6 8 4\n";
+    std::fs::write(folder.join("skew.obj"), obj).expect("it can be written");
+    let assets = "<asset><mesh name=\"m\" file=\"skew.obj\" inertia=\"exact\"/></asset>";
+    let text = robot(assets, "<body><joint/><geom type=\"mesh\" mesh=\"m\" density=\"1000\"/></body>");
+    let model = model_of(&folder.join("robot.xml").to_string_lossy(), &text);
+    let inertia = &model.bodies.last().expect("a body").inertia;
+    let com = inertia.com.to_array().map(|x| x.to_f64());
+    let expected = [0.056520013150520874, 0.054418564453605996, 0.0475759149924373];
+    let off = com
+        .iter()
+        .zip(expected)
+        .fold((inertia.mass.to_f64() - 0.9660000052911534).abs(), |most, (a, b)| most.max((a - b).abs()));
+    assert!(off < 1e-14, "off by {off:e}: {:e} kg at {com:?}", inertia.mass.to_f64());
     std::fs::remove_dir_all(&folder).expect("it was made here");
 }
 

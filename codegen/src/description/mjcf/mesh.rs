@@ -227,7 +227,8 @@ fn text_stl(bytes: &[u8]) -> Option<Vec<Triangle>> {
     Some(corners.chunks_exact(3).map(|c| [c[0], c[1], c[2]]).collect())
 }
 
-/// Lines `v x y z` and `f i j k …`, whose numbers count vertices from 1, or from the last one backwards.
+/// Lines `v x y z` and `f i j k …`, whose numbers count vertices from 1, or from the last one backwards. As MuJoCo has it, coordinates are f32, as in STL, and
+/// the shorter diagonal of a face of four corners divides it, the second one where they are as long.
 fn obj(bytes: &[u8]) -> Result<Vec<Triangle>, String> {
     let text = String::from_utf8_lossy(bytes);
     let mut vertices: Vec<Vec3<Dd>> = Vec::new();
@@ -236,7 +237,7 @@ fn obj(bytes: &[u8]) -> Result<Vec<Triangle>, String> {
         let complaint = || format!("its line {} says no vertex or face", i + 1);
         let (word, rest) = line.trim().split_once(char::is_whitespace).unwrap_or((line.trim(), ""));
         match word {
-            "v" => vertices.push(three(rest).ok_or_else(complaint)?),
+            "v" => vertices.push(three(rest).ok_or_else(complaint)?.map(|x| Dd::from(f64::from(x.to_f64() as f32)))),
             "f" => {
                 let corner = |word: &str| {
                     let index: i64 = word.split('/').next()?.parse().ok()?;
@@ -245,7 +246,12 @@ fn obj(bytes: &[u8]) -> Result<Vec<Triangle>, String> {
                 };
                 let corners: Option<Vec<Vec3<Dd>>> = rest.split_whitespace().map(corner).collect();
                 let corners = corners.filter(|corners| corners.len() >= 3).ok_or_else(complaint)?;
-                faces.extend(corners[1..].windows(2).map(|pair| [corners[0], pair[0], pair[1]]));
+                match corners[..] {
+                    [a, b, c, d] if !((a - c).dot(a - c).to_f64() < (b - d).dot(b - d).to_f64()) => {
+                        faces.extend([[a, b, d], [b, c, d]]);
+                    }
+                    _ => faces.extend(corners[1..].windows(2).map(|pair| [corners[0], pair[0], pair[1]])),
+                }
             }
             _ => {}
         }
