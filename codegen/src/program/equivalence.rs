@@ -228,7 +228,7 @@ impl Check<'_> {
                 return Err(lost);
             }
         }
-        // a rounding of all that a result is made of is little; of a scale that is a result's own any program loses some
+        // two roundings of all that a result is made of are little; of a scale that is a result's own any program loses some
         let least = match function.spec().judged {
             Judged::ByResidual | Judged::ByColumns => {
                 losses.plain = vec![losses.plain.iter().copied().fold(0.0, f64::max); losses.plain.len()];
@@ -236,7 +236,7 @@ impl Check<'_> {
             }
             Judged::ByInertias => OF_INERTIAS,
             Judged::ByDerivatives => LOSSES,
-            Judged::ByScale => 1.0,
+            Judged::ByScale => 2.0,
         };
         losses.compare(function.name(), self.graph, options.scalar, least)
     }
