@@ -186,7 +186,7 @@ impl FitData {
     }
 
     /// Puts errors into a fit that hold for noise as what is left has it, of any colour and common to several outputs: A M A, where A is the inverse of the
-    /// squares of the rows y, and M the sum of y ρ y over instants up to so many lags apart and all outputs, with the correlation ρ of what is left of them. How much greater the
+    /// squares of the rows y, and M the sum of y ρ y over instants up to so many lags apart and all outputs, with the correlation ρ of the noise. How much greater the
     /// squares of errors become.
     fn colour(
         &self,
@@ -198,23 +198,24 @@ impl FitData {
         let n = self.columns;
         // in full up to half of the lags, less and less beyond: far ones are chance more than noise
         let weight = |lag: usize| (2.0 * (1.0 - lag as f64 / (lags + 1) as f64)).min(1.0);
-        let weighed = |lag: usize| self.correlation(left, (noise, used), lag) * weight(lag);
-        let correlation: Vec<DMatrix<f64>> = (0..=lags).map(weighed).collect();
-        let mut middle = DMatrix::zeros(n, n);
-        for (block, used) in self.blocks.iter().zip(used) {
-            middle += self.spread_products(block, (noise, used), &correlation);
-        }
+        let weighed = |all: &[DMatrix<f64>]| all.iter().enumerate().map(|(lag, x)| x * weight(lag)).collect::<Vec<_>>();
         let white = DMatrix::from_row_slice(n, n, &fitted.covariance);
         let inverse = &white / fitted.variance.max(f64::MIN_POSITIVE);
-        let told: Vec<usize> = (0..n).filter(|k| !fitted.untold.contains(k)).collect();
-        // the fit has taken its share of what is left, and the more so the fewer instants are independent of each other
-        let instants = used.iter().flatten().filter(|used| **used).count();
-        let apart = (0..self.outputs).map(|j| 1.0 + 2.0 * correlation[1..].iter().map(|c| c[(j, j)]).sum::<f64>());
-        let apart = apart.sum::<f64>() / self.outputs as f64;
-        let taken = told.len() as f64 * apart.max(1.0) / (instants * self.outputs).max(1) as f64;
-        let covariance = &inverse * middle * &inverse / (1.0 - taken).max(0.2);
+        let mut rows: Vec<NoisyRows> =
+            self.blocks.iter().zip(used).map(|(block, used)| self.noisy_rows(block, (noise, used))).collect();
+        let mut correlation: Vec<DMatrix<f64>> =
+            (0..=lags).map(|lag| self.correlation(left, (noise, used), lag)).collect();
+        let taken = {
+            let weighed = weighed(&correlation);
+            rows.iter_mut().for_each(|rows| rows.spread_by(&weighed));
+            self.taken(&rows, &inverse, used, lags)
+        };
+        correlation.iter_mut().zip(taken).for_each(|(correlation, taken)| *correlation += taken);
+        let weighed = weighed(&correlation);
+        rows.iter_mut().for_each(|rows| rows.spread_by(&weighed));
+        let covariance = &inverse * middle(&rows, n) * &inverse;
         let (mut ratio, mut count) = (0.0, 0);
-        for k in told {
+        for k in (0..n).filter(|k| !fitted.untold.contains(k)) {
             // noise of little correlation can come out negative by chance; half of white is the least that is believed
             let own = covariance[(k, k)].max(0.5 * inverse[(k, k)]);
             fitted.errors[k] = own.sqrt();
@@ -231,41 +232,35 @@ impl FitData {
         }
     }
 
-    /// Σ y ρ y of a block.
-    fn spread_products(
-        &self,
-        block: &FitBlock,
-        (noise, used): (&[f64], &[bool]),
-        correlation: &[DMatrix<f64>],
-    ) -> DMatrix<f64> {
-        let (n, instants) = (self.columns, used.len());
-        let rows: Vec<DMatrix<f64>> = noise
-            .iter()
-            .enumerate()
-            .map(|(j, unit)| {
-                let row = |k: usize| &block.rows[(k * self.outputs + j) * n..][..n];
-                DMatrix::from_fn(instants, n, |k, c| if used[k] { row(k)[c] / unit } else { 0.0 })
-            })
-            .collect();
-        let mut spread = vec![DMatrix::<f64>::zeros(instants, n); self.outputs];
-        for (lag, rho) in correlation.iter().enumerate().filter(|(lag, _)| *lag < instants) {
-            for (i, k) in (0..self.outputs).flat_map(|i| (0..self.outputs).map(move |k| (i, k))) {
-                let rho = rho[(i, k)];
-                for c in 0..n {
-                    let column = rows[k].column(c);
-                    let ahead = rows[i].column(c);
-                    for t in lag..instants {
-                        spread[i][(t, c)] += rho * column[t - lag];
-                        if lag > 0 {
-                            spread[k][(t - lag, c)] += rho * ahead[t];
-                        }
-                    }
+    fn noisy_rows(&self, block: &FitBlock, (noise, used): (&[f64], &[bool])) -> NoisyRows {
+        let n = self.columns;
+        let of_output = |(j, unit): (usize, &f64)| {
+            let row = |k: usize| &block.rows[(k * self.outputs + j) * n..][..n];
+            DMatrix::from_fn(used.len(), n, |k, c| if used[k] { row(k)[c] / unit } else { 0.0 })
+        };
+        NoisyRows { rows: noise.iter().enumerate().map(of_output).collect(), spread: Vec::new() }
+    }
+
+    /// By how much the fit makes the correlation of what is left smaller than that of the noise, at each lag: noise that looks like what the rows say is fitted, and
+    /// rows are slow, as noise behind a low-pass is. With the noise's covariance Σ and P = Y A Yᵀ that is P Σ + Σ P − P Σ P, in the mean over instants.
+    fn taken(&self, rows: &[NoisyRows], inverse: &DMatrix<f64>, used: &[Vec<bool>], lags: usize) -> Vec<DMatrix<f64>> {
+        let half = inverse * middle(rows, self.columns) * inverse * 0.5;
+        let mut sums = vec![DMatrix::<f64>::zeros(self.outputs, self.outputs); lags + 1];
+        let mut counts = vec![0_usize; lags + 1];
+        for (block, used) in rows.iter().zip(used) {
+            let shares: Vec<DMatrix<f64>> =
+                block.rows.iter().zip(&block.spread).map(|(y, spread)| spread * inverse - y * &half).collect();
+            for lag in 0..=lags.min(used.len().saturating_sub(1)) {
+                let products = |now: &DMatrix<f64>, before: &DMatrix<f64>| {
+                    now.rows(lag, used.len() - lag).dot(&before.rows(0, used.len() - lag))
+                };
+                for (i, k) in (0..self.outputs).flat_map(|i| (0..self.outputs).map(move |k| (i, k))) {
+                    sums[lag][(i, k)] += products(&block.rows[i], &shares[k]) + products(&shares[i], &block.rows[k]);
                 }
+                counts[lag] += (lag..used.len()).filter(|k| used[*k] && used[k - lag]).count();
             }
         }
-        let mut sum = DMatrix::zeros(n, n);
-        rows.iter().zip(&spread).for_each(|(y, spread)| sum.gemm_tr(1.0, y, spread, 1.0));
-        sum
+        sums.into_iter().zip(counts).map(|(sum, count)| sum / count.max(1) as f64).collect()
     }
 
     /// The correlation of what is left of each output with that of each so many instants before.
@@ -282,4 +277,43 @@ impl FitData {
         }
         sums / count.max(1) as f64
     }
+}
+
+/// The rows of a block in units of the noise, zero where they are not used: per output a matrix, and what the noise's covariance makes of it.
+struct NoisyRows {
+    rows: Vec<DMatrix<f64>>,
+    spread: Vec<DMatrix<f64>>,
+}
+
+impl NoisyRows {
+    /// Σ Y, by the correlation at each lag.
+    fn spread_by(&mut self, correlation: &[DMatrix<f64>]) {
+        let outputs = self.rows.len();
+        let (instants, n) = self.rows.first().map_or((0, 0), DMatrix::shape);
+        self.spread = vec![DMatrix::<f64>::zeros(instants, n); outputs];
+        for (lag, rho) in correlation.iter().enumerate().filter(|(lag, _)| *lag < instants) {
+            for (i, k) in (0..outputs).flat_map(|i| (0..outputs).map(move |k| (i, k))) {
+                let rho = rho[(i, k)];
+                for c in 0..n {
+                    let column = self.rows[k].column(c);
+                    let ahead = self.rows[i].column(c);
+                    for t in lag..instants {
+                        self.spread[i][(t, c)] += rho * column[t - lag];
+                        if lag > 0 {
+                            self.spread[k][(t - lag, c)] += rho * ahead[t];
+                        }
+                    }
+                }
+            }
+        }
+    }
+}
+
+/// Yᵀ Σ Y, over all blocks.
+fn middle(rows: &[NoisyRows], columns: usize) -> DMatrix<f64> {
+    let mut sum = DMatrix::zeros(columns, columns);
+    for (y, spread) in rows.iter().flat_map(|block| block.rows.iter().zip(&block.spread)) {
+        sum.gemm_tr(1.0, y, spread, 1.0);
+    }
+    sum
 }

@@ -48,6 +48,9 @@ fn intervals_of_95_percent_hold_so_often_where_noise_is_smoothed() {
     for count in inside {
         assert!((0.905..0.985).contains(&(f64::from(count as u32) / f64::from(runs))), "{inside:?}");
     }
+    // fits of few independent instants take much of the noise, which their errors make up for
+    let mean = inside.iter().sum::<usize>() as f64 / f64::from(5 * runs);
+    assert!((0.94..0.965).contains(&mean), "{mean}");
     // as if noise were white they would not
     assert!(f64::from(white as u32) < 0.88 * f64::from(5 * runs), "{white}");
 }

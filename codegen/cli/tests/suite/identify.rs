@@ -232,12 +232,12 @@ fn intervals_of_95_percent_hold_about_so_often() {
 
 /// `cargo test -p straightline-cli --test suite -- --ignored --nocapture identify::long_proof`
 #[test]
-#[ignore = "ten minutes: a thousand identifications"]
+#[ignore = "two minutes: a thousand identifications"]
 fn long_proof_that_intervals_of_95_percent_hold_in_a_thousand_runs() {
     let all = coverage(std::env::var("RUNS").ok().and_then(|runs| runs.parse().ok()).unwrap_or(1000));
     all.iter().for_each(|own| println!("{own:?}"));
-    // 1000 runs scatter by 0.7 %; noise of velocities, which regressors have, takes some of the rest
-    assert!(all.iter().all(|own| (0.9..0.975).contains(&own.rate)), "{all:?}");
+    // 1000 runs scatter by 0.7 %
+    assert!(all.iter().all(|own| (0.925..0.975).contains(&own.rate)), "{all:?}");
 }
 
 #[test]
