@@ -237,7 +237,7 @@ fn long_proof_that_intervals_of_95_percent_hold_in_a_thousand_runs() {
     let all = coverage(std::env::var("RUNS").ok().and_then(|runs| runs.parse().ok()).unwrap_or(1000));
     all.iter().for_each(|own| println!("{own:?}"));
     // 1000 runs scatter by 0.7 %
-    assert!(all.iter().all(|own| (0.925..0.975).contains(&own.rate)), "{all:?}");
+    assert!(all.iter().all(|own| (0.93..0.975).contains(&own.rate)), "{all:?}");
 }
 
 #[test]
