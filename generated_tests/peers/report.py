@@ -8,7 +8,7 @@ import subprocess
 import sys
 
 GENERATED = ["casadi", "casadi_fast", "casadi_cse", "casadi_clang", "cppadcg"]
-OURS = ["straightline", "straightline_fma", "straightline_avx2", "straightline_portable"]
+OURS = ["straightline", "straightline_fma", "straightline_avx2", "straightline_wide", "straightline_portable"]
 FUNCTIONS = {"id": "inverse dynamics", "crba": "mass matrix", "aba": "forward dynamics",
              "fkjac": "forward kinematics + Jacobian", "id_deriv": "derivatives of inverse dynamics",
              "fd_deriv": "derivatives of forward dynamics"}
@@ -46,7 +46,7 @@ def aims(function, robot):
 def batch_aim(run, function, robot, name):
     """Times the states per second of the best generated C."""
     if function in DERIVATIVES:
-        return BATCH_DERIVATIVES_AIM if name == "straightline_fma" and "fma_avx512_gflops" in run.machine else None
+        return BATCH_DERIVATIVES_AIM if name in ("straightline_fma", "straightline_wide") and "fma_avx512_gflops" in run.machine else None
     return BATCH_AIMS.get(name, {}).get(kind(robot))
 
 
@@ -146,8 +146,9 @@ def batches(out, run):
     peak = widest or float(run.machine.get("fma_avx2_gflops", 0))
     by_widest = f"{widest:.0f} by AVX-512" if widest else "which has no AVX-512"
     out.append("\n## Batches, one core: ns per state\n")
-    out.append("States per second relative to the best generated C called in a loop. `straightline_fma` fuses and uses the widest instructions of the "
-               "machine, `straightline_avx2` fuses and has 256 bits at most; `loop` is the plain function. Peak of this core, measured: "
+    out.append("States per second relative to the best generated C called in a loop. `straightline_fma` fuses, for the instructions of this machine, of which LLVM "
+               "takes registers of 256 bits; `straightline_wide` is compiled with `-C target-feature=-prefer-256-bit`, too; `straightline_avx2` fuses and has AVX2 alone. "
+               "`loop` is the plain function, `soa` a structure of arrays, `blocks` are eight states after eight, each component by eight (`…_lanes::<8>`). Peak of this core, measured: "
                f"{float(run.machine.get('fma_avx2_gflops', 0)):.0f} Gflop/s by AVX2, {by_widest}. Share of it: operations of the function, without those "
                "inside sines and cosines, over what the peak would do in that time.\n")
     out.append("| function | robot | ours | ns | best generated C, ns | times as many states per second | aim | share of peak |")
@@ -158,10 +159,10 @@ def batches(out, run):
             if name not in OURS or (mode == "loop" and name != "straightline"):
                 continue
             gain = min(generated) / nanoseconds if generated else None
-            aim = batch_aim(run, function, robot, name) if mode == "soa" else None
+            aim = batch_aim(run, function, robot, name) if mode in ("soa", "blocks") else None
             said = "" if aim is None or gain is None else f"{aim:g} {'holds' if gain >= aim else '**missed**'}"
             beside = f"{min(generated):.1f} | {gain:.2f}" if generated else "not built |"
-            operations = run.operations(robot, function) if mode == "soa" else None
+            operations = run.operations(robot, function) if mode in ("soa", "blocks") else None
             share = f"{100 * operations[0] / nanoseconds / peak:.0f} %" if operations and peak else ""
             out.append(f"| {FUNCTIONS.get(function, function)} | {robot} | {name}, {mode} | {nanoseconds:.1f} | {beside} | {said} | {share} |")
     if not run.single:

@@ -152,6 +152,32 @@ mod derivative_calls {
     }
     batch!(rbd_id_deriv_batch_soa, inverse_dynamics_derivatives_batch_soa);
     batch!(rbd_fd_deriv_batch_soa, forward_dynamics_derivatives_batch_soa);
+
+    /// Blocks of eight states, one after the other.
+    macro_rules! blocks {
+        ($name:ident, $function:ident) => {
+            #[no_mangle]
+            pub unsafe extern "C" fn $name(n: c_long, q: *const f64, v: *const f64, x: *const f64, y: *mut f64) {
+                type Lanes<const K: usize> = [[f64; 8]; K];
+                type Squares = [[[f64; 8]; NV]; NV];
+                let blocks = n as usize / 8;
+                let q: &[Lanes<NQ>] = from_raw_parts(q.cast(), blocks);
+                let (v, x): (&[Lanes<NV>], &[Lanes<NV>]) =
+                    (from_raw_parts(v.cast(), blocks), from_raw_parts(x.cast(), blocks));
+                let y: &mut [[Squares; 2]] = from_raw_parts_mut(y.cast(), blocks);
+                SQUARES.with_borrow_mut(|h| {
+                    h.resize(n as usize * NV * NV, 0.0);
+                    let h: &mut [Squares] = from_raw_parts_mut(h.as_mut_ptr().cast(), blocks);
+                    for (k, (y, h)) in y.iter_mut().zip(h).enumerate() {
+                        let [by_q, by_v] = y;
+                        dynamics::$function(&q[k], &v[k], &x[k], by_q, by_v, h);
+                    }
+                });
+            }
+        };
+    }
+    blocks!(rbd_id_deriv_batch_blocks, inverse_dynamics_derivatives_lanes);
+    blocks!(rbd_fd_deriv_batch_blocks, forward_dynamics_derivatives_lanes);
 }
 
 /// Random states, structure of arrays, and room for results.
