@@ -56,8 +56,8 @@ const POINT: f64 = 1e-3;
 const NOISE: f64 = 1e-6;
 /// A program may lose so many times what the plain equations lose in the same scalar.
 const LOSSES: f64 = 8.0;
-/// So many roundings of √(H_ii H_jj) any program may lose of H_ij.
-const OF_INERTIAS: f64 = 12.0;
+/// So many roundings of √(H_ii H_jj) any program may lose of H_ij: one for each body that it adds up, within bounds.
+const OF_INERTIAS: [usize; 2] = [12, 30];
 /// At so many random states.
 const STATES: usize = 6;
 /// Digits of H are looked at in so many more.
@@ -234,7 +234,7 @@ impl Check<'_> {
                 losses.plain = vec![losses.plain.iter().copied().fold(0.0, f64::max); losses.plain.len()];
                 LOSSES / 2.0
             }
-            Judged::ByInertias => OF_INERTIAS,
+            Judged::ByInertias => robot.model.bodies.len().clamp(OF_INERTIAS[0], OF_INERTIAS[1]) as f64,
             Judged::ByDerivatives => LOSSES,
             Judged::ByScale => 2.0,
         };
