@@ -42,7 +42,7 @@ impl BatchLayout {
     }
 
     /// Copies the entries of `N` states from `first` on beside one another, those of the last of all states for lanes behind it.
-    #[inline]
+    #[inline(always)]
     pub(crate) fn gather<T: Copy, const N: usize>(self, from: &[T], [first, states]: [usize; 2], to: &mut [[T; N]]) {
         let is_whole = first + N <= states;
         if self.by_state == 1 && is_whole {
@@ -66,7 +66,7 @@ impl BatchLayout {
     }
 
     /// Copies the lanes of entry `k` back, but those behind the last state.
-    #[inline]
+    #[inline(always)]
     pub(crate) fn scatter<T: Copy, const N: usize>(
         self,
         lanes: &[T; N],

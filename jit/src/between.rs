@@ -39,6 +39,7 @@ impl PlacedCalls {
     }
 
     /// Runs them on a frame of `N` lanes, from which `read` reads.
+    #[inline(always)]
     pub fn run<T: Number, const N: usize>(
         &self,
         frame: &mut [T],

@@ -112,15 +112,31 @@ impl<T: Number> Executable<T> {
         }
     }
 
-    /// Runs a block of states whose inputs are in the frame.
-    pub fn run(&self, frame: &mut [T], is_batch: bool) {
+    /// Runs one state whose inputs are in the frame.
+    pub fn run(&self, frame: &mut [T]) {
         match &self.code {
-            Some(code) => code[usize::from(is_batch)].run(frame),
-            None => {
-                let (inputs, results) = frame.split_at_mut(self.tape.inputs * interpreter::LANES);
-                interpreter::run(&self.tape, inputs.as_chunks().0, results.as_chunks_mut().0);
-            }
+            Some([code, _]) => code.run(frame),
+            None => self.interpret(frame),
         }
+    }
+
+    /// Runs a block of a batch, likewise, as part of a [`NativeJob`](crate::native::NativeJob). `N` is what [`Self::lanes`] says.
+    #[inline(always)]
+    pub fn run_block<const N: usize>(&self, frame: &mut [T]) {
+        match &self.code {
+            Some([_, code]) => code.run_lanes::<N>(frame, SineInstructions::ANY),
+            None => self.interpret(frame),
+        }
+    }
+
+    fn interpret(&self, frame: &mut [T]) {
+        let (inputs, results) = frame.split_at_mut(self.tape.inputs * interpreter::LANES);
+        interpreter::run(&self.tape, inputs.as_chunks().0, results.as_chunks_mut().0);
+    }
+
+    /// The instructions that blocks of a batch are performed by.
+    pub fn instructions(&self) -> SineInstructions {
+        self.code.as_ref().map_or(SineInstructions::ANY, |[_, code]| code.sines)
     }
 
     /// The first lanes of the results of one state that was run.
@@ -140,6 +156,7 @@ impl<T: Number> Executable<T> {
     }
 
     /// The lanes of a result of a block that was run.
+    #[inline(always)]
     pub fn result<'a>(&'a self, frame: &'a [T], k: usize, is_batch: bool) -> &'a [T] {
         match &self.code {
             Some(code) => code[usize::from(is_batch)].at(frame, code[usize::from(is_batch)].results[k]),
@@ -162,7 +179,8 @@ struct MachineCode<T> {
     /// Of each phase, the calls before it and whether it has instructions.
     phases: Vec<(PlacedCalls, bool)>,
     results: Vec<MemoryPlace>,
-    sines: (SineInstructions, bool),
+    sines: SineInstructions,
+    is_fused: bool,
 }
 
 impl<T: Number> MachineCode<T> {
@@ -178,13 +196,13 @@ impl<T: Number> MachineCode<T> {
         let phases = tape.phases.iter().map(placed).collect();
         let results = tape.results.iter().map(|operand| allocated.place(*operand)).collect();
         let native = pages(&functions, [frame_length, constants.len()])?;
-        let sines = (SineInstructions::best(), tape.fused);
-        Ok(MachineCode { native, lanes, frame_length, constants, phases, results, sines })
+        let (sines, is_fused) = (SineInstructions::best(), tape.fused);
+        Ok(MachineCode { native, lanes, frame_length, constants, phases, results, sines, is_fused })
     }
 }
 
 impl<T: Number> MachineCode<T> {
-    #[inline]
+    #[inline(always)]
     fn at<'a>(&'a self, frame: &'a [T], place: MemoryPlace) -> &'a [T] {
         let (memory, at) = match place {
             MemoryPlace::Cell(cell) => (frame, cell),
@@ -196,21 +214,22 @@ impl<T: Number> MachineCode<T> {
 
     fn run(&self, frame: &mut [T]) {
         match self.lanes {
-            1 => self.run_lanes::<1>(frame),
-            2 => self.run_lanes::<2>(frame),
-            4 => self.run_lanes::<4>(frame),
-            8 => self.run_lanes::<8>(frame),
-            16 => self.run_lanes::<16>(frame),
+            1 => self.run_lanes::<1>(frame, self.sines),
+            2 => self.run_lanes::<2>(frame, self.sines),
+            4 => self.run_lanes::<4>(frame, self.sines),
+            8 => self.run_lanes::<8>(frame, self.sines),
+            16 => self.run_lanes::<16>(frame, self.sines),
             lanes => unreachable!("no vector has {lanes} numbers"),
         }
     }
 
-    fn run_lanes<const N: usize>(&self, frame: &mut [T]) {
+    #[inline(always)]
+    fn run_lanes<const N: usize>(&self, frame: &mut [T], by: SineInstructions) {
         let read = |frame: &[T], place: MemoryPlace| -> [T; N] {
             self.at(frame, place).try_into().expect("as many numbers as lanes")
         };
         for (k, (calls, has_instructions)) in self.phases.iter().enumerate() {
-            calls.run(frame, read, self.sines);
+            calls.run(frame, read, (by, self.is_fused));
             if *has_instructions {
                 self.native.run(k, frame, &self.constants);
             }
@@ -236,7 +255,7 @@ pub mod tests {
         let run = |executable: &Executable<f64>| {
             let mut frame = vec![0.0; executable.frame_length(false)];
             frame[..executable.lanes(false)].fill(0.3);
-            executable.run(&mut frame, false);
+            executable.run(&mut frame);
             executable.result(&frame, 0, false)[0]
         };
         for execution in ExecutionMode::ALL {

@@ -2,6 +2,7 @@
 
 use crate::batch::BatchLayout;
 use crate::engine::{Executable, ExecutionMode};
+use crate::native::NativeJob;
 use crate::number::Number;
 use crate::tape::ProgramTape;
 use std::fmt;
@@ -419,7 +420,7 @@ fn run_state<T: Number>(executable: &Executable<T>, frame: &mut [T], inputs: &[&
             frame.chunks_exact_mut(lanes).zip(scalars).for_each(|(block, x)| block.fill(*x));
         }
     }
-    executable.run(frame, false);
+    executable.run(frame);
     executable.first_lanes(frame, results);
 }
 
@@ -429,39 +430,47 @@ fn run_states<T: Number>(
     inputs: &[(&[T], BatchLayout)],
     results: &mut [(&mut [T], BatchLayout)],
 ) {
+    let by = function.executable.instructions();
     match function.executable.lanes(true) {
-        1 => run_blocks::<T, 1>(function, states, inputs, results),
-        2 => run_blocks::<T, 2>(function, states, inputs, results),
-        4 => run_blocks::<T, 4>(function, states, inputs, results),
-        8 => run_blocks::<T, 8>(function, states, inputs, results),
-        16 => run_blocks::<T, 16>(function, states, inputs, results),
+        1 => by.perform(Blocks::<T, 1> { function, states, inputs, results }),
+        2 => by.perform(Blocks::<T, 2> { function, states, inputs, results }),
+        4 => by.perform(Blocks::<T, 4> { function, states, inputs, results }),
+        8 => by.perform(Blocks::<T, 8> { function, states, inputs, results }),
+        16 => by.perform(Blocks::<T, 16> { function, states, inputs, results }),
         lanes => unreachable!("no vector has {lanes} numbers"),
     }
 }
 
-/// Blocks of as many states as a vector has lanes.
-fn run_blocks<T: Number, const N: usize>(
-    function: &LoadedFunction<T>,
+/// A batch in blocks of as many states as a vector has lanes.
+struct Blocks<'a, 'b, 'r, T, const N: usize> {
+    function: &'a LoadedFunction<T>,
     states: usize,
-    inputs: &[(&[T], BatchLayout)],
-    results: &mut [(&mut [T], BatchLayout)],
-) {
-    let LoadedFunction { inputs: taken, outputs, executable, .. } = function;
-    let mut frame = vec![T::default(); executable.frame_length(true)];
-    for first in (0..states).step_by(N) {
-        let mut rest = frame.as_chunks_mut::<N>().0;
-        for (port, (array, layout)) in taken.iter().zip(inputs) {
-            let (own, others) = rest.split_at_mut(port.len());
-            layout.gather(array, [first, states], own);
-            rest = others;
-        }
-        executable.run(&mut frame, true);
-        let mut k = 0;
-        for (port, (array, layout)) in outputs.iter().zip(&mut *results) {
-            for entry in 0..port.len() {
-                let lanes: &[T; N] = executable.result(&frame, k, true).try_into().expect("as many numbers as lanes");
-                layout.scatter(lanes, [first, states], entry, array);
-                k += 1;
+    inputs: &'a [(&'b [T], BatchLayout)],
+    results: &'a mut [(&'r mut [T], BatchLayout)],
+}
+
+impl<T: Number, const N: usize> NativeJob for Blocks<'_, '_, '_, T, N> {
+    #[inline(always)]
+    fn run(self) {
+        let Blocks { function, states, inputs, results } = self;
+        let LoadedFunction { inputs: taken, outputs, executable, .. } = function;
+        let mut frame = vec![T::default(); executable.frame_length(true)];
+        for first in (0..states).step_by(N) {
+            let mut rest = frame.as_chunks_mut::<N>().0;
+            for (port, (array, layout)) in taken.iter().zip(inputs) {
+                let (own, others) = rest.split_at_mut(port.len());
+                layout.gather(array, [first, states], own);
+                rest = others;
+            }
+            executable.run_block::<N>(&mut frame);
+            let mut k = 0;
+            for (port, (array, layout)) in outputs.iter().zip(&mut *results) {
+                for entry in 0..port.len() {
+                    let lanes: &[T; N] =
+                        executable.result(&frame, k, true).try_into().expect("as many numbers as lanes");
+                    layout.scatter(lanes, [first, states], entry, array);
+                    k += 1;
+                }
             }
         }
     }

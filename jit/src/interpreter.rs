@@ -62,7 +62,7 @@ pub(crate) fn sin_cos<T: Number, const N: usize>(sums: [[T; 2]; N], fused: bool)
 }
 
 /// The sum of these angles and what its rounding lost, lane by lane: as [`Real::sum_of_angles`](straightline_core::Real::sum_of_angles). Of one angle nothing is lost.
-#[inline]
+#[inline(always)]
 pub(crate) fn sum_of_angles<T: Number, const N: usize>(mut terms: impl Iterator<Item = [T; N]>) -> [[T; 2]; N] {
     let mut sums = terms.next().expect("an angle has a term").map(|angle| [angle, T::zero()]);
     for term in terms {

@@ -120,8 +120,21 @@ impl SineInstructions {
         SineInstructions::ANY
     }
 
+    /// Does that by these instructions: with the same bits by all.
+    pub fn perform(self, job: impl NativeJob) {
+        match self.0 {
+            SineTarget::Any => job.run(),
+            // SAFETY: only `best` makes these, and only where the machine has the instructions
+            #[cfg(target_arch = "x86_64")]
+            SineTarget::Avx2 => unsafe { perform_by_avx2(job) },
+            // SAFETY: as above
+            #[cfg(target_arch = "x86_64")]
+            SineTarget::Avx512 => unsafe { perform_by_avx512(job) },
+        }
+    }
+
     /// Sines and cosines of sums of angles in two pieces, lane by lane: the same bits by all instructions.
-    #[inline]
+    #[inline(always)]
     pub fn sin_cos<T: Number, const N: usize>(self, sums: [[T; 2]; N], fused: bool) -> ([T; N], [T; N]) {
         match self.0 {
             SineTarget::Any => interpreter::sin_cos(sums, fused),
@@ -133,6 +146,25 @@ impl SineInstructions {
             SineTarget::Avx512 => unsafe { sin_cos_by_avx512(sums, fused) },
         }
     }
+}
+
+/// What is compiled once for each set of instructions. All that it calls is `#[inline(always)]`, and so becomes part of functions for these instructions: numbers that
+/// machine code reads as a vector are written as one, which the store buffer hands on at once, and as several it does not.
+pub trait NativeJob {
+    /// Does it.
+    fn run(self);
+}
+
+#[cfg(target_arch = "x86_64")]
+#[target_feature(enable = "avx2,fma")]
+fn perform_by_avx2(job: impl NativeJob) {
+    job.run();
+}
+
+#[cfg(target_arch = "x86_64")]
+#[target_feature(enable = "avx2,fma,avx512f,avx512vl,avx512dq")]
+fn perform_by_avx512(job: impl NativeJob) {
+    job.run();
 }
 
 #[cfg(target_arch = "x86_64")]
