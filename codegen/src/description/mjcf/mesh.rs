@@ -247,7 +247,7 @@ fn obj(bytes: &[u8]) -> Result<Vec<Triangle>, String> {
                 let corners: Option<Vec<Vec3<Dd>>> = rest.split_whitespace().map(corner).collect();
                 let corners = corners.filter(|corners| corners.len() >= 3).ok_or_else(complaint)?;
                 match corners[..] {
-                    [a, b, c, d] if !((a - c).dot(a - c).to_f64() < (b - d).dot(b - d).to_f64()) => {
+                    [a, b, c, d] if (a - c).dot(a - c).to_f64() >= (b - d).dot(b - d).to_f64() => {
                         faces.extend([[a, b, d], [b, c, d]]);
                     }
                     _ => faces.extend(corners[1..].windows(2).map(|pair| [corners[0], pair[0], pair[1]])),
