@@ -450,6 +450,8 @@ struct Blocks<'a, 'b, 'r, T, const N: usize> {
 }
 
 impl<T: Number, const N: usize> NativeJob for Blocks<'_, '_, '_, T, N> {
+    type Output = ();
+
     #[inline(always)]
     fn run(self) {
         let Blocks { function, states, inputs, results } = self;

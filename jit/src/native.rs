@@ -121,7 +121,8 @@ impl SineInstructions {
     }
 
     /// Does that by these instructions: with the same bits by all.
-    pub fn perform(self, job: impl NativeJob) {
+    #[inline(always)]
+    pub fn perform<J: NativeJob>(self, job: J) -> J::Output {
         match self.0 {
             SineTarget::Any => job.run(),
             // SAFETY: only `best` makes these, and only where the machine has the instructions
@@ -133,48 +134,45 @@ impl SineInstructions {
         }
     }
 
-    /// Sines and cosines of sums of angles in two pieces, lane by lane: the same bits by all instructions.
+    /// Sines and cosines of sums of angles in two pieces, lane by lane.
     #[inline(always)]
     pub fn sin_cos<T: Number, const N: usize>(self, sums: [[T; 2]; N], fused: bool) -> ([T; N], [T; N]) {
-        match self.0 {
-            SineTarget::Any => interpreter::sin_cos(sums, fused),
-            // SAFETY: only `best` makes these, and only where the machine has the instructions
-            #[cfg(target_arch = "x86_64")]
-            SineTarget::Avx2 => unsafe { sin_cos_by_avx2(sums, fused) },
-            // SAFETY: as above
-            #[cfg(target_arch = "x86_64")]
-            SineTarget::Avx512 => unsafe { sin_cos_by_avx512(sums, fused) },
-        }
+        self.perform(SinesOfSums { sums, fused })
     }
 }
 
 /// What is compiled once for each set of instructions. All that it calls is `#[inline(always)]`, and so becomes part of functions for these instructions: numbers that
 /// machine code reads as a vector are written as one, which the store buffer hands on at once, and as several it does not.
 pub trait NativeJob {
+    /// What comes of it.
+    type Output;
+
     /// Does it.
-    fn run(self);
+    fn run(self) -> Self::Output;
 }
 
 #[cfg(target_arch = "x86_64")]
 #[target_feature(enable = "avx2,fma")]
-fn perform_by_avx2(job: impl NativeJob) {
-    job.run();
+fn perform_by_avx2<J: NativeJob>(job: J) -> J::Output {
+    job.run()
 }
 
 #[cfg(target_arch = "x86_64")]
 #[target_feature(enable = "avx2,fma,avx512f,avx512vl,avx512dq")]
-fn perform_by_avx512(job: impl NativeJob) {
-    job.run();
+fn perform_by_avx512<J: NativeJob>(job: J) -> J::Output {
+    job.run()
 }
 
-#[cfg(target_arch = "x86_64")]
-#[target_feature(enable = "avx2,fma")]
-fn sin_cos_by_avx2<T: Number, const N: usize>(sums: [[T; 2]; N], fused: bool) -> ([T; N], [T; N]) {
-    interpreter::sin_cos(sums, fused)
+struct SinesOfSums<T, const N: usize> {
+    sums: [[T; 2]; N],
+    fused: bool,
 }
 
-#[cfg(target_arch = "x86_64")]
-#[target_feature(enable = "avx2,fma,avx512f,avx512vl,avx512dq")]
-fn sin_cos_by_avx512<T: Number, const N: usize>(sums: [[T; 2]; N], fused: bool) -> ([T; N], [T; N]) {
-    interpreter::sin_cos(sums, fused)
+impl<T: Number, const N: usize> NativeJob for SinesOfSums<T, N> {
+    type Output = ([T; N], [T; N]);
+
+    #[inline(always)]
+    fn run(self) -> Self::Output {
+        interpreter::sin_cos(self.sums, self.fused)
+    }
 }
