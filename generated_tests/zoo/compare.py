@@ -7,6 +7,7 @@ mjcf       every MJCF beside MuJoCo, contacts and limits off, damping and spring
 urdf       every URDF beside Pinocchio, whose joints all have coordinates: those that follow others move with them, tau = G^T tau_full
 mimic      every URDF with joints that follow others beside Pinocchio with `mimic=True`, with forward dynamics
 converted  every URDF written as MJCF by `straightline convert`, read by MuJoCo, beside ours of the URDF; every MJCF as URDF beside Pinocchio
+saved      every URDF that MuJoCo reads and saves as MJCF, with all digits: ours of both
 pairs      robots of which packages have a URDF and an MJCF, ours of both, with the number that differs most
 drake      every SDF, SDFs that `straightline convert` writes of URDFs and MJCFs, URDFs and MJCFs beside Drake, which computes H of all joints
 drawn      SDFs drawn at random beside Drake
@@ -595,6 +596,29 @@ def both_formats(urdf: pathlib.Path, mjcf: pathlib.Path, straightline: str, fold
     return {"joints": second.nv, **greatest(states()), "differs": differs(first, second, by_order)}
 
 
+def saved_by_mujoco(urdf: pathlib.Path, folder: pathlib.Path) -> pathlib.Path:
+    """The robot as MuJoCo reads it and saves it as MJCF, without meshes, with 17 digits."""
+    import mujoco
+
+    root = ElementTree.parse(urdf).getroot()
+    for link in root.iter("link"):
+        for shape in [child for child in link if child.tag in ("visual", "collision")]:
+            link.remove(shape)
+    for other in root.findall("mujoco"):
+        root.remove(other)
+    try:
+        spec = mujoco.MjSpec.from_string(ElementTree.tostring(root, encoding="unicode"))
+        spec.compile()
+    except ValueError as error:
+        raise NotCompared(f"not read by MuJoCo: {first_line(error)}") from None
+    # six digits else
+    library = next(pathlib.Path(mujoco.__file__).parent.glob("libmujoco.*"))
+    getattr(ctypes.CDLL(str(library)), "_mjPRIVATE__set_xml_precision")(17)
+    saved = folder / "saved.xml"
+    saved.write_text(spec.to_xml())
+    return saved
+
+
 def spelt(name: str) -> str:
     """A name as both files spell it."""
     return re.sub(r"(_leg)?_joint$|[^a-z0-9]", "", name.lower())
@@ -717,12 +741,14 @@ class Table:
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("what", nargs="+", choices=["mjcf", "urdf", "mimic", "converted", "pairs", "drake", "drawn"])
+    parser.add_argument("what", nargs="+", choices=["mjcf", "urdf", "mimic", "converted", "saved", "pairs", "drake", "drawn"])
     parser.add_argument("--work", required=True, type=pathlib.Path)
     parser.add_argument("--straightline", required=True)
     parser.add_argument("--optimise", default=OPTIMISE, choices=["full", "quick"])
     given = parser.parse_args()
     globals()["OPTIMISE"] = given.optimise
+
+    plain = ("H", "bias", "inverse")
 
     def read(path: pathlib.Path, scene: str, scratch: pathlib.Path, *more: str) -> Ours:
         return Ours(path, scene, given.straightline, scratch, *more)
@@ -755,13 +781,16 @@ def main() -> None:
     def urdf_converted(path: pathlib.Path, scratch: pathlib.Path) -> dict[str, float]:
         return urdf(write(path, "urdf", given.straightline, scratch), scratch)
 
+    def saved(path: pathlib.Path, scratch: pathlib.Path) -> dict[str, float]:
+        found = both_formats(path, saved_by_mujoco(path, scratch), given.straightline, scratch)
+        return {what: found[what] for what in plain}
+
     def drake(path: pathlib.Path, scratch: pathlib.Path) -> dict[str, float]:
         return all_errors(drake_states, DAMPING_ALONE if path.suffix == ".xml" else NO_FRICTION, path, scratch)
 
     def drake_converted(path: pathlib.Path, scratch: pathlib.Path) -> dict[str, float]:
         return drake(write(path, "sdf", given.straightline, scratch), scratch)
 
-    plain = ("H", "bias", "inverse")
     for what in given.what:
         if what == "mjcf":
             table = Table(given.work, "masses", *plain)
@@ -773,6 +802,10 @@ def main() -> None:
                 table.row("URDF" if what == "urdf" else "MJCF by `convert`", package, paths, urdf if what == "urdf" else converted)
             for package, paths in robots("mjcf", given.work) if what == "converted" else []:
                 table.row("URDF by `convert`", package, paths, urdf_converted)
+        elif what == "saved":
+            table = Table(given.work, *plain)
+            for package, paths in robots("urdf", given.work):
+                table.row("URDF and MJCF", package, paths, saved)
         elif what == "mimic":
             table = Table(given.work, *plain, "forward")
             for package, paths in robots("urdf", given.work):
