@@ -248,8 +248,12 @@ impl FitData {
         let mut sums = vec![DMatrix::<f64>::zeros(self.outputs, self.outputs); lags + 1];
         let mut counts = vec![0_usize; lags + 1];
         for (block, used) in rows.iter().zip(used) {
-            let shares: Vec<DMatrix<f64>> =
-                block.rows.iter().zip(&block.spread).map(|(y, spread)| spread * inverse - y * &half).collect();
+            let of_output = |(y, spread): (&DMatrix<f64>, &DMatrix<f64>)| {
+                let mut shares = spread * inverse - y * &half;
+                (0..used.len()).filter(|k| !used[*k]).for_each(|k| shares.row_mut(k).fill(0.0));
+                shares
+            };
+            let shares: Vec<DMatrix<f64>> = block.rows.iter().zip(&block.spread).map(of_output).collect();
             for lag in 0..=lags.min(used.len().saturating_sub(1)) {
                 let products = |now: &DMatrix<f64>, before: &DMatrix<f64>| {
                     now.rows(lag, used.len() - lag).dot(&before.rows(0, used.len() - lag))

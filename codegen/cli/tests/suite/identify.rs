@@ -238,7 +238,7 @@ fn long_proof_that_intervals_of_95_percent_hold_in_a_thousand_runs() {
     all.iter().for_each(|own| println!("{own:?}"));
     // 1000 runs scatter by 0.7 %
     assert!(all.iter().all(|own| (0.93..0.975).contains(&own.rate)), "{all:?}");
-    // noise of velocities, which regressors have, biases by less than a third of the error
+    // noise of velocities, which regressors have, biases by less than half of the error
     assert!(all.iter().all(|own| own.bias.abs() < 0.45 && (0.9..1.1).contains(&own.spread)), "{all:?}");
 }
 
