@@ -1,5 +1,8 @@
 //! Where the numbers of many states are.
 
+use crate::native::NativeInstructions;
+use crate::number::Number;
+
 /// How the entries of an input or a result lie in memory: entry k of state i at `i * by_state + k * by_entry`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct BatchLayout {
@@ -41,46 +44,91 @@ impl BatchLayout {
         (n == 1 || a > 0) && (m == 1 || b > 0) && (n == 1 || m == 1 || within(n, a, b) || within(m, b, a))
     }
 
-    /// Copies the entries of `N` states from `first` on beside one another, those of the last of all states for lanes behind it.
+    /// Copies so many entries of `N` states from `first` on beside one another, those of the last of all states for lanes behind it. What stands behind
+    /// the entries in `to` may be overwritten.
     #[inline(always)]
-    pub(crate) fn gather<T: Copy, const N: usize>(self, from: &[T], [first, states]: [usize; 2], to: &mut [[T; N]]) {
+    pub(crate) fn gather<T: Number, const N: usize>(
+        self,
+        from: &[T],
+        [first, states]: [usize; 2],
+        (entries, to): (usize, &mut [[T; N]]),
+        by: NativeInstructions,
+    ) {
         let is_whole = first + N <= states;
         if self.by_state == 1 && is_whole {
-            for (k, lanes) in to.iter_mut().enumerate() {
+            for (k, lanes) in to[..entries].iter_mut().enumerate() {
                 lanes.copy_from_slice(&from[k * self.by_entry + first..][..N]);
             }
             return;
         }
         if self.by_entry == 1 && is_whole {
-            let entries = to.len();
-            let rows: [&[T]; N] = std::array::from_fn(|lane| &from[(first + lane) * self.by_state..][..entries]);
-            for (k, lanes) in to.iter_mut().enumerate() {
-                *lanes = rows.map(|row| row[k]);
+            for k in (0..entries).step_by(N) {
+                let count = N.min(entries - k);
+                let row = |lane: usize| &from[(first + lane) * self.by_state + k..];
+                // what stands behind a row is read along with it where there is something
+                let rows: [[T; N]; N] = match row(N - 1).len() >= N {
+                    true => std::array::from_fn(|lane| *row(lane).first_chunk().expect("as long as the last")),
+                    false => std::array::from_fn(|lane| padded(&row(lane)[..count])),
+                };
+                let columns = by.transposed(rows);
+                match to[k..].first_chunk_mut() {
+                    Some(to) => *to = columns,
+                    None => to[k..k + count].copy_from_slice(&columns[..count]),
+                }
             }
             return;
         }
-        for (k, lanes) in to.iter_mut().enumerate() {
+        for (k, lanes) in to[..entries].iter_mut().enumerate() {
             *lanes =
                 std::array::from_fn(|lane| from[k * self.by_entry + (first + lane).min(states - 1) * self.by_state]);
         }
     }
 
-    /// Copies the lanes of entry `k` back, but those behind the last state.
+    /// Copies the lanes of so many entries back, but those behind the last state.
     #[inline(always)]
-    pub(crate) fn scatter<T: Copy, const N: usize>(
+    pub(crate) fn scatter<'a, T: Number, const N: usize>(
         self,
-        lanes: &[T; N],
+        (entries, lanes): (usize, impl Fn(usize) -> &'a [T; N]),
         [first, states]: [usize; 2],
-        k: usize,
         to: &mut [T],
+        by: NativeInstructions,
     ) {
-        let to = &mut to[k * self.by_entry + first * self.by_state..];
-        if self.by_state == 1 && first + N <= states {
-            to[..N].copy_from_slice(lanes);
+        let is_whole = first + N <= states;
+        if self.by_state == 1 && is_whole {
+            for k in 0..entries {
+                to[k * self.by_entry + first..][..N].copy_from_slice(lanes(k));
+            }
             return;
         }
-        for (lane, x) in lanes.iter().enumerate().take(states - first) {
-            to[lane * self.by_state] = *x;
+        if self.by_entry == 1 && is_whole {
+            // a row of fewer than `N` is written with what belongs to the next one, which is written after it
+            let last = entries.saturating_sub(N);
+            let end = if self.by_state == entries { (first + N) * entries } else { 0 };
+            for k in (0..entries).step_by(N).map(|k| k.min(last)) {
+                let count = N.min(entries - k);
+                let columns = std::array::from_fn(|j| if j < count { *lanes(k + j) } else { [T::default(); N] });
+                for (lane, row) in by.transposed(columns).iter().enumerate() {
+                    let at = (first + lane) * self.by_state + k;
+                    let length = if count == N || at + N <= end { N } else { count };
+                    match to[at..at + length].first_chunk_mut() {
+                        Some(to) => *to = *row,
+                        None => to[at..at + length].copy_from_slice(&row[..length]),
+                    }
+                }
+            }
+            return;
+        }
+        for k in 0..entries {
+            let to = &mut to[k * self.by_entry + first * self.by_state..];
+            for (lane, x) in lanes(k).iter().enumerate().take(states - first) {
+                to[lane * self.by_state] = *x;
+            }
         }
     }
+}
+
+/// A row with zeros behind it.
+#[inline(always)]
+fn padded<T: Number, const N: usize>(row: &[T]) -> [T; N] {
+    std::array::from_fn(|k| row.get(k).copied().unwrap_or_default())
 }

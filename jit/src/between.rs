@@ -4,7 +4,7 @@
 
 use crate::allocation::{AllocatedProgram, MemoryPlace};
 use crate::interpreter::sum_of_angles;
-use crate::native::SineInstructions;
+use crate::native::NativeInstructions;
 use crate::number::Number;
 use crate::tape::{CallBetween, TapeOperand};
 
@@ -44,7 +44,7 @@ impl PlacedCalls {
         &self,
         frame: &mut [T],
         read: impl Fn(&[T], MemoryPlace) -> [T; N],
-        (by, fused): (SineInstructions, bool),
+        (by, fused): (NativeInstructions, bool),
     ) {
         let put = |frame: &mut [T], cell: usize, value: [T; N]| frame.as_chunks_mut().0[cell] = value;
         let sum = |frame: &[T], angles: &[MemoryPlace]| sum_of_angles(angles.iter().map(|angle| read(frame, *angle)));

@@ -4,7 +4,7 @@ use crate::allocation::{AllocatedProgram, MemoryPlace};
 use crate::between::PlacedCalls;
 use crate::interpreter;
 use crate::machine::{Format, HostInstructions, SIGNS};
-use crate::native::{NativeCode, SineInstructions};
+use crate::native::{NativeCode, NativeInstructions};
 use crate::number::Number;
 use crate::tape::{Phase, ProgramTape};
 use std::{fmt, io};
@@ -124,7 +124,7 @@ impl<T: Number> Executable<T> {
     #[inline(always)]
     pub fn run_block<const N: usize>(&self, frame: &mut [T]) {
         match &self.code {
-            Some([_, code]) => code.run_lanes::<N>(frame, SineInstructions::ANY),
+            Some([_, code]) => code.run_lanes::<N>(frame, NativeInstructions::ANY),
             None => self.interpret(frame),
         }
     }
@@ -135,8 +135,8 @@ impl<T: Number> Executable<T> {
     }
 
     /// The instructions that blocks of a batch are performed by.
-    pub fn instructions(&self) -> SineInstructions {
-        self.code.as_ref().map_or(SineInstructions::ANY, |[_, code]| code.sines)
+    pub fn instructions(&self) -> NativeInstructions {
+        self.code.as_ref().map_or(NativeInstructions::ANY, |[_, code]| code.sines)
     }
 
     /// The first lanes of the results of one state that was run.
@@ -153,6 +153,12 @@ impl<T: Number> Executable<T> {
                 entries.enumerate().for_each(|(k, x)| *x = self.result(frame, k, false)[0]);
             }
         }
+    }
+
+    /// The lanes of a result of a block of a batch that was run, as many as [`Self::lanes`] says.
+    #[inline(always)]
+    pub fn lanes_of_result<'a, const N: usize>(&'a self, frame: &'a [T], k: usize) -> &'a [T; N] {
+        self.result(frame, k, true).try_into().expect("as many numbers as lanes")
     }
 
     /// The lanes of a result of a block that was run.
@@ -179,7 +185,7 @@ struct MachineCode<T> {
     /// Of each phase, the calls before it and whether it has instructions.
     phases: Vec<(PlacedCalls, bool)>,
     results: Vec<MemoryPlace>,
-    sines: SineInstructions,
+    sines: NativeInstructions,
     is_fused: bool,
 }
 
@@ -196,7 +202,7 @@ impl<T: Number> MachineCode<T> {
         let phases = tape.phases.iter().map(placed).collect();
         let results = tape.results.iter().map(|operand| allocated.place(*operand)).collect();
         let native = pages(&functions, [frame_length, constants.len()])?;
-        let (sines, is_fused) = (SineInstructions::best(), tape.fused);
+        let (sines, is_fused) = (NativeInstructions::best(), tape.fused);
         Ok(MachineCode { native, lanes, frame_length, constants, phases, results, sines, is_fused })
     }
 }
@@ -224,7 +230,7 @@ impl<T: Number> MachineCode<T> {
     }
 
     #[inline(always)]
-    fn run_lanes<const N: usize>(&self, frame: &mut [T], by: SineInstructions) {
+    fn run_lanes<const N: usize>(&self, frame: &mut [T], by: NativeInstructions) {
         let read = |frame: &[T], place: MemoryPlace| -> [T; N] {
             self.at(frame, place).try_into().expect("as many numbers as lanes")
         };

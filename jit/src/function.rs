@@ -456,23 +456,21 @@ impl<T: Number, const N: usize> NativeJob for Blocks<'_, '_, '_, T, N> {
     fn run(self) {
         let Blocks { function, states, inputs, results } = self;
         let LoadedFunction { inputs: taken, outputs, executable, .. } = function;
+        let by = executable.instructions();
         let mut frame = vec![T::default(); executable.frame_length(true)];
         for first in (0..states).step_by(N) {
+            // inputs stand first in a frame, one behind the other; what is behind them is written before it is read
             let mut rest = frame.as_chunks_mut::<N>().0;
             for (port, (array, layout)) in taken.iter().zip(inputs) {
-                let (own, others) = rest.split_at_mut(port.len());
-                layout.gather(array, [first, states], own);
-                rest = others;
+                layout.gather(array, [first, states], (port.len(), rest), by);
+                rest = &mut rest[port.len()..];
             }
             executable.run_block::<N>(&mut frame);
             let mut k = 0;
             for (port, (array, layout)) in outputs.iter().zip(&mut *results) {
-                for entry in 0..port.len() {
-                    let lanes: &[T; N] =
-                        executable.result(&frame, k, true).try_into().expect("as many numbers as lanes");
-                    layout.scatter(lanes, [first, states], entry, array);
-                    k += 1;
-                }
+                let lanes = |entry: usize| executable.lanes_of_result::<N>(&frame, k + entry);
+                layout.scatter((port.len(), lanes), [first, states], array, by);
+                k += port.len();
             }
         }
     }

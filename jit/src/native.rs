@@ -1,8 +1,11 @@
-//! Machine code in memory that can be executed, and sines by the instructions of this machine: the one place with `unsafe`.
+//! Machine code in memory that can be executed, and jobs that are compiled for the instructions of this machine: the one place with `unsafe`.
 //!
 //! What is called has been written by [`machine`](crate::machine) from instructions of [`allocation`](crate::allocation), which read and write cells of the frame and read
 //! constants, whose numbers are known: [`NativeCode::run`] asserts that both are as long. Pages are written first and made executable then, and are
 //! never both. A function returns to where it was called from, keeps no address and touches nothing else.
+
+#[cfg(target_arch = "x86_64")]
+mod transposition;
 
 use crate::interpreter;
 #[cfg(target_arch = "x86_64")]
@@ -93,12 +96,12 @@ fn publish(code: &[u8]) {
     }
 }
 
-/// The instructions that sines are compiled for, found out once.
+/// The instructions that jobs are performed by, found out once.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct SineInstructions(SineTarget);
+pub struct NativeInstructions(NativeTarget);
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum SineTarget {
+enum NativeTarget {
     Any,
     #[cfg(target_arch = "x86_64")]
     Avx2,
@@ -106,32 +109,44 @@ enum SineTarget {
     Avx512,
 }
 
-impl SineInstructions {
+impl NativeInstructions {
     /// What every machine has.
-    pub const ANY: SineInstructions = SineInstructions(SineTarget::Any);
+    pub const ANY: NativeInstructions = NativeInstructions(NativeTarget::Any);
 
     /// The fastest that this machine has.
-    pub fn best() -> SineInstructions {
+    pub fn best() -> NativeInstructions {
         #[cfg(target_arch = "x86_64")]
         if x86_has!("avx2" "fma") {
             let is_wide = x86_has!("avx512f" "avx512vl" "avx512dq");
-            return SineInstructions(if is_wide { SineTarget::Avx512 } else { SineTarget::Avx2 });
+            return NativeInstructions(if is_wide { NativeTarget::Avx512 } else { NativeTarget::Avx2 });
         }
-        SineInstructions::ANY
+        NativeInstructions::ANY
     }
 
     /// Does that by these instructions: with the same bits by all.
     #[inline(always)]
     pub fn perform<J: NativeJob>(self, job: J) -> J::Output {
         match self.0 {
-            SineTarget::Any => job.run(),
+            NativeTarget::Any => job.run(),
             // SAFETY: only `best` makes these, and only where the machine has the instructions
             #[cfg(target_arch = "x86_64")]
-            SineTarget::Avx2 => unsafe { perform_by_avx2(job) },
+            NativeTarget::Avx2 => unsafe { perform_by_avx2(job) },
             // SAFETY: as above
             #[cfg(target_arch = "x86_64")]
-            SineTarget::Avx512 => unsafe { perform_by_avx512(job) },
+            NativeTarget::Avx512 => unsafe { perform_by_avx512(job) },
         }
+    }
+
+    /// Columns of these rows, as part of a [`NativeJob`] that is performed by these instructions.
+    #[inline(always)]
+    pub fn transposed<T: Number, const N: usize>(self, rows: [[T; N]; N]) -> [[T; N]; N] {
+        let by_registers = match self.0 {
+            // SAFETY: only `best` makes these, and only where the machine has the instructions
+            #[cfg(target_arch = "x86_64")]
+            NativeTarget::Avx512 => unsafe { transposition::transposed(rows) },
+            _ => None,
+        };
+        by_registers.unwrap_or_else(|| std::array::from_fn(|k| rows.map(|row| row[k])))
     }
 
     /// Sines and cosines of sums of angles in two pieces, lane by lane.

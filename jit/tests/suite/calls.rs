@@ -1,10 +1,11 @@
 //! What is wrong with calls and options is said, and batches lie in memory however they like.
 
+use crate::bits::TestNumber;
 use straightline_codegen::diagnostic::Source;
 use straightline_codegen::options::Options;
 use straightline_codegen::scene::{Budget, InputRange, JointRanges, MaxError, Scene};
 use straightline_codegen::{Function, Scalar};
-use straightline_jit::{BatchLayout, CallError, ExecutionMode, LoadError, Robot};
+use straightline_jit::{BatchLayout, CallError, ExecutionMode, LoadError, Number, Robot};
 
 const PLANAR: &str = include_str!("../../../robots/descriptions/planar_2r.toml");
 
@@ -66,36 +67,80 @@ fn wrong_robots_and_options_for_texts_are_refused() {
     assert!(refused.to_string().starts_with(why), "{refused}");
 }
 
-/// Rows, columns, and numbers between others; as many states as fill vectors and as do not; none.
+/// Joints that slide beside one another, so many.
+fn star<T: Number>(joints: usize, execution: ExecutionMode) -> Robot<T> {
+    let mut text = "[robot]\nname = \"star\"\n[[link]]\nname = \"base\"\n".to_string();
+    for k in 0..joints {
+        text += &format!(
+            "[[link]]\nname = \"l{k}\"\nmass = {}\ncom = [0.1, 0.0, 0.0]\ninertia = [0.1, 0.1, 0.1]\n\
+             [[joint]]\nname = \"j{k}\"\nkind = \"prismatic\"\nparent = \"base\"\nchild = \"l{k}\"\naxis = [0.0, 0.6, 0.8]\n",
+            0.3 * (k + 1) as f64
+        );
+    }
+    let options = Options { functions: vec![Function::InverseDynamics], ..Options::default() };
+    Robot::load_to_run(&Source::new("star.toml", text), &options, execution).unwrap_or_else(|e| panic!("{e}"))
+}
+
+/// Rows one behind the other and with gaps, columns, and numbers between others.
+fn layouts(states: usize, entries: usize) -> [BatchLayout; 4] {
+    [
+        BatchLayout::states_of(entries),
+        BatchLayout { by_state: entries + 3, by_entry: 1 },
+        BatchLayout::entries_of(states),
+        BatchLayout { by_state: entries * 3 + 1, by_entry: 2 },
+    ]
+}
+
+fn batches_have_the_bits_of_single_calls<T: TestNumber>(joints: usize, execution: ExecutionMode) {
+    let robot = star::<T>(joints, execution);
+    let function = robot.function("inverse_dynamics").expect("it was asked for");
+    for states in [0, 1, 2, 3, 4, 5, 7, 8, 9, 33] {
+        let layouts = layouts(states, joints);
+        // arrays as long as they have to be, and longer
+        let most = states * (joints * 3 + 1) + 1;
+        for (k, to) in layouts.into_iter().enumerate() {
+            let from: [BatchLayout; 3] = std::array::from_fn(|input| layouts[(k + input) % 4]);
+            let length = |layout: BatchLayout| match states {
+                0 => 0,
+                _ => (states - 1) * layout.by_state + (joints - 1) * layout.by_entry + 1,
+            };
+            let x: Vec<T> = (0..most).map(|k| T::of((k as f64 * 0.37).sin() * 3.0)).collect();
+            let inputs = from.map(|layout| (&x[..length(layout)], layout));
+            let mut tau = vec![T::of(f64::NAN); most];
+            function.batch(states, &inputs, &mut [(&mut tau, to)]).unwrap_or_else(|e| panic!("{e}"));
+            let mut exact = vec![T::of(f64::NAN); length(to)];
+            function.batch(states, &inputs, &mut [(&mut exact, to)]).unwrap_or_else(|e| panic!("{e}"));
+            assert!(exact.iter().zip(&tau).all(|(a, b)| a.bits() == b.bits()), "an array without room behind it");
+            let mut written = vec![false; most];
+            for i in 0..states {
+                let at = |layout: &BatchLayout, k: usize| i * layout.by_state + k * layout.by_entry;
+                let own = from.map(|layout| (0..joints).map(|k| x[at(&layout, k)]).collect::<Vec<T>>());
+                let mut one = vec![T::of(0.0); joints];
+                let call = function.call(&[&own[0], &own[1], &own[2]], &mut [&mut one]);
+                call.unwrap_or_else(|e| panic!("{e}"));
+                for (k, wanted) in one.iter().enumerate() {
+                    let found = tau[at(&to, k)];
+                    assert_eq!(
+                        found.bits(),
+                        wanted.bits(),
+                        "{execution:?}, {joints}, {states} states, {from:?}, {to:?}"
+                    );
+                    written[at(&to, k)] = true;
+                }
+            }
+            let is_left = |(x, written): (&T, &bool)| *written || x.is_nan();
+            assert!(tau.iter().zip(&written).all(is_left), "nothing else is written");
+        }
+    }
+}
+
+/// As many states as fill vectors and as do not, none; states of fewer entries than a vector has, as many, and more.
 #[test]
 fn batches_have_the_bits_of_single_calls_in_every_layout() {
     for execution in ExecutionMode::ALL {
-        let robot = planar(execution);
-        let function = robot.function("mass_matrix").expect("it was asked for");
-        for states in [0, 1, 2, 3, 4, 5, 7, 8, 9, 33] {
-            let layouts = |entries: usize| {
-                let apart = BatchLayout { by_state: entries * 3 + 1, by_entry: 2 };
-                [BatchLayout::states_of(entries), BatchLayout::entries_of(states), apart]
-            };
-            let length = 40 * (4 * 3 + 1);
-            for (from, to) in layouts(2).into_iter().flat_map(|from| layouts(4).map(|to| (from, to))) {
-                let q: Vec<f64> = (0..length).map(|k| (k as f64 * 0.37).sin() * 3.0).collect();
-                let mut h = vec![f64::NAN; length];
-                function.batch(states, &[(&q, from)], &mut [(&mut h, to)]).unwrap_or_else(|e| panic!("{e}"));
-                let mut written = vec![false; length];
-                for i in 0..states {
-                    let own = [0, 1].map(|k| q[i * from.by_state + k * from.by_entry]);
-                    let mut one = [0.0; 4];
-                    function.call(&[&own], &mut [&mut one]).unwrap_or_else(|e| panic!("{e}"));
-                    for (k, x) in one.iter().enumerate() {
-                        let at = i * to.by_state + k * to.by_entry;
-                        assert_eq!(h[at].to_bits(), x.to_bits(), "{execution:?}, {states} states, {from:?}, {to:?}");
-                        written[at] = true;
-                    }
-                }
-                let is_left = |(h, written): (&f64, &bool)| *written || h.is_nan();
-                assert!(h.iter().zip(&written).all(is_left), "nothing else is written");
-            }
+        for joints in [1, 2, 3, 5, 8, 11, 16, 19] {
+            batches_have_the_bits_of_single_calls::<f64>(joints, execution);
+            batches_have_the_bits_of_single_calls::<f32>(joints, execution);
         }
     }
 }
@@ -106,10 +151,7 @@ fn threads_have_the_bits_of_one() {
     let robot = planar(ExecutionMode::best());
     let function = robot.function("mass_matrix").expect("it was asked for");
     for (states, threads) in [(0, 2), (1, 2), (3, 2), (64, 2), (65, 3), (1000, 2), (1001, 7), (33, 100), (50, 0)] {
-        let layouts = |entries: usize| {
-            let apart = BatchLayout { by_state: entries * 3 + 1, by_entry: 2 };
-            [BatchLayout::states_of(entries), BatchLayout::entries_of(states), apart]
-        };
+        let layouts = |entries: usize| layouts(states, entries);
         let q: Vec<f64> = (0..states * 7 + 7).map(|k| (k as f64 * 0.37).sin() * 3.0).collect();
         for (from, to) in layouts(2).into_iter().flat_map(|from| layouts(4).map(|to| (from, to))) {
             let mut h = [vec![f64::NAN; states * 13 + 7], vec![f64::NAN; states * 13 + 7]];
