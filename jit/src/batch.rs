@@ -62,18 +62,27 @@ impl BatchLayout {
             return;
         }
         if self.by_entry == 1 && is_whole {
+            let mut rows = [[T::default(); N]; N];
             for k in (0..entries).step_by(N) {
-                let count = N.min(entries - k);
-                let row = |lane: usize| &from[(first + lane) * self.by_state + k..];
-                // what stands behind a row is read along with it where there is something
-                let rows: [[T; N]; N] = match row(N - 1).len() >= N {
-                    true => std::array::from_fn(|lane| *row(lane).first_chunk().expect("as long as the last")),
-                    false => std::array::from_fn(|lane| padded(&row(lane)[..count])),
-                };
-                let columns = by.transposed(rows);
+                let from = &from[first * self.by_state + k..];
+                if from.len() >= (N - 1) * self.by_state + N {
+                    // what stands behind a row is read along with it
+                    for (lane, row) in rows.iter_mut().enumerate() {
+                        *row = *from[lane * self.by_state..].first_chunk().expect("as long as all");
+                    }
+                } else {
+                    for (lane, row) in rows.iter_mut().enumerate() {
+                        row.iter_mut().zip(&from[lane * self.by_state..]).for_each(|(x, from)| *x = *from);
+                    }
+                }
                 match to[k..].first_chunk_mut() {
-                    Some(to) => *to = columns,
-                    None => to[k..k + count].copy_from_slice(&columns[..count]),
+                    Some(to) => by.transpose(&rows, to),
+                    None => {
+                        let mut columns = [[T::default(); N]; N];
+                        by.transpose(&rows, &mut columns);
+                        let count = to.len() - k;
+                        to[k..].copy_from_slice(&columns[..count]);
+                    }
                 }
             }
             return;
@@ -84,51 +93,48 @@ impl BatchLayout {
         }
     }
 
-    /// Copies the lanes of so many entries back, but those behind the last state.
+    /// Copies the lanes of so many entries back, but those behind the last state. There are `N` more of them than entries.
     #[inline(always)]
-    pub(crate) fn scatter<'a, T: Number, const N: usize>(
+    pub(crate) fn scatter<T: Number, const N: usize>(
         self,
-        (entries, lanes): (usize, impl Fn(usize) -> &'a [T; N]),
+        (entries, lanes): (usize, &[[T; N]]),
         [first, states]: [usize; 2],
         to: &mut [T],
         by: NativeInstructions,
     ) {
         let is_whole = first + N <= states;
         if self.by_state == 1 && is_whole {
-            for k in 0..entries {
-                to[k * self.by_entry + first..][..N].copy_from_slice(lanes(k));
+            for (k, lanes) in lanes[..entries].iter().enumerate() {
+                to[k * self.by_entry + first..][..N].copy_from_slice(lanes);
             }
             return;
         }
         if self.by_entry == 1 && is_whole {
-            // a row of fewer than `N` is written with what belongs to the next one, which is written after it
+            // a row of fewer than `N` is written along with what belongs to the next ones, which are written after it, where they follow without a gap
+            let wide = match entries {
+                1.. if entries < N && self.by_state == entries => N + 1 - N.div_ceil(entries),
+                _ if entries < N => 0,
+                _ => N,
+            };
             let last = entries.saturating_sub(N);
-            let end = if self.by_state == entries { (first + N) * entries } else { 0 };
+            let mut rows = [[T::default(); N]; N];
             for k in (0..entries).step_by(N).map(|k| k.min(last)) {
-                let count = N.min(entries - k);
-                let columns = std::array::from_fn(|j| if j < count { *lanes(k + j) } else { [T::default(); N] });
-                for (lane, row) in by.transposed(columns).iter().enumerate() {
-                    let at = (first + lane) * self.by_state + k;
-                    let length = if count == N || at + N <= end { N } else { count };
-                    match to[at..at + length].first_chunk_mut() {
-                        Some(to) => *to = *row,
-                        None => to[at..at + length].copy_from_slice(&row[..length]),
-                    }
+                by.transpose(lanes[k..].first_chunk().expect("there are more than entries"), &mut rows);
+                let to = &mut to[first * self.by_state + k..];
+                for (lane, row) in rows[..wide].iter().enumerate() {
+                    *to[lane * self.by_state..].first_chunk_mut().expect("as long as all") = *row;
+                }
+                for (lane, row) in rows.iter().enumerate().skip(wide) {
+                    to[lane * self.by_state..][..entries].copy_from_slice(&row[..entries]);
                 }
             }
             return;
         }
-        for k in 0..entries {
+        for (k, lanes) in lanes[..entries].iter().enumerate() {
             let to = &mut to[k * self.by_entry + first * self.by_state..];
-            for (lane, x) in lanes(k).iter().enumerate().take(states - first) {
+            for (lane, x) in lanes.iter().enumerate().take(states - first) {
                 to[lane * self.by_state] = *x;
             }
         }
     }
-}
-
-/// A row with zeros behind it.
-#[inline(always)]
-fn padded<T: Number, const N: usize>(row: &[T]) -> [T; N] {
-    std::array::from_fn(|k| row.get(k).copied().unwrap_or_default())
 }

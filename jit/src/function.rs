@@ -2,7 +2,7 @@
 
 use crate::batch::BatchLayout;
 use crate::engine::{Executable, ExecutionMode};
-use crate::native::NativeJob;
+use crate::native::{NativeInstructions, NativeJob};
 use crate::number::Number;
 use crate::tape::ProgramTape;
 use std::fmt;
@@ -453,24 +453,28 @@ impl<T: Number, const N: usize> NativeJob for Blocks<'_, '_, '_, T, N> {
     type Output = ();
 
     #[inline(always)]
-    fn run(self) {
+    fn run(self, by: NativeInstructions) {
         let Blocks { function, states, inputs, results } = self;
         let LoadedFunction { inputs: taken, outputs, executable, .. } = function;
-        let by = executable.instructions();
+        let [taken, outputs] = [taken, outputs].map(|ports| ports.iter().map(Port::len).collect::<Vec<usize>>());
         let mut frame = vec![T::default(); executable.frame_length(true)];
+        let entries: usize = outputs.iter().sum();
+        let mut found = vec![[T::default(); N]; entries + N];
         for first in (0..states).step_by(N) {
             // inputs stand first in a frame, one behind the other; what is behind them is written before it is read
             let mut rest = frame.as_chunks_mut::<N>().0;
-            for (port, (array, layout)) in taken.iter().zip(inputs) {
-                layout.gather(array, [first, states], (port.len(), rest), by);
-                rest = &mut rest[port.len()..];
+            for (entries, (array, layout)) in taken.iter().zip(inputs) {
+                layout.gather(array, [first, states], (*entries, rest), by);
+                rest = &mut rest[*entries..];
             }
             executable.run_block::<N>(&mut frame);
-            let mut k = 0;
-            for (port, (array, layout)) in outputs.iter().zip(&mut *results) {
-                let lanes = |entry: usize| executable.lanes_of_result::<N>(&frame, k + entry);
-                layout.scatter((port.len(), lanes), [first, states], array, by);
-                k += port.len();
+            for (k, lanes) in found[..entries].iter_mut().enumerate() {
+                *lanes = *executable.lanes_of_result(&frame, k);
+            }
+            let mut rest = &found[..];
+            for (entries, (array, layout)) in outputs.iter().zip(&mut *results) {
+                layout.scatter((*entries, rest), [first, states], array, by);
+                rest = &rest[*entries..];
             }
         }
     }

@@ -127,7 +127,7 @@ impl NativeInstructions {
     #[inline(always)]
     pub fn perform<J: NativeJob>(self, job: J) -> J::Output {
         match self.0 {
-            NativeTarget::Any => job.run(),
+            NativeTarget::Any => job.run(self),
             // SAFETY: only `best` makes these, and only where the machine has the instructions
             #[cfg(target_arch = "x86_64")]
             NativeTarget::Avx2 => unsafe { perform_by_avx2(job) },
@@ -137,16 +137,15 @@ impl NativeInstructions {
         }
     }
 
-    /// Columns of these rows, as part of a [`NativeJob`] that is performed by these instructions.
+    /// Writes the columns of rows.
     #[inline(always)]
-    pub fn transposed<T: Number, const N: usize>(self, rows: [[T; N]; N]) -> [[T; N]; N] {
-        let by_registers = match self.0 {
+    pub fn transpose<T: Number, const N: usize>(self, rows: &[[T; N]; N], columns: &mut [[T; N]; N]) {
+        match self.0 {
             // SAFETY: only `best` makes these, and only where the machine has the instructions
             #[cfg(target_arch = "x86_64")]
-            NativeTarget::Avx512 => unsafe { transposition::transposed(rows) },
-            _ => None,
-        };
-        by_registers.unwrap_or_else(|| std::array::from_fn(|k| rows.map(|row| row[k])))
+            NativeTarget::Avx512 => unsafe { transposition::transpose(rows, columns) },
+            _ => transpose_numbers(rows, columns),
+        }
     }
 
     /// Sines and cosines of sums of angles in two pieces, lane by lane.
@@ -162,20 +161,28 @@ pub trait NativeJob {
     /// What comes of it.
     type Output;
 
-    /// Does it.
-    fn run(self) -> Self::Output;
+    /// Does it, as part of what is compiled for these instructions.
+    fn run(self, by: NativeInstructions) -> Self::Output;
 }
 
 #[cfg(target_arch = "x86_64")]
 #[target_feature(enable = "avx2,fma")]
 fn perform_by_avx2<J: NativeJob>(job: J) -> J::Output {
-    job.run()
+    job.run(NativeInstructions(NativeTarget::Avx2))
 }
 
 #[cfg(target_arch = "x86_64")]
 #[target_feature(enable = "avx2,fma,avx512f,avx512vl,avx512dq")]
 fn perform_by_avx512<J: NativeJob>(job: J) -> J::Output {
-    job.run()
+    job.run(NativeInstructions(NativeTarget::Avx512))
+}
+
+/// Writes the columns of rows, number by number.
+#[inline(always)]
+fn transpose_numbers<T: Copy, const N: usize>(rows: &[[T; N]; N], columns: &mut [[T; N]; N]) {
+    for (k, column) in columns.iter_mut().enumerate() {
+        *column = rows.map(|row| row[k]);
+    }
 }
 
 struct SinesOfSums<T, const N: usize> {
@@ -187,7 +194,7 @@ impl<T: Number, const N: usize> NativeJob for SinesOfSums<T, N> {
     type Output = ([T; N], [T; N]);
 
     #[inline(always)]
-    fn run(self) -> Self::Output {
+    fn run(self, _by: NativeInstructions) -> Self::Output {
         interpreter::sin_cos(self.sums, self.fused)
     }
 }
