@@ -25,12 +25,14 @@ pub fn read(bytes: &[u8]) -> Result<JointLog, LogError> {
     let body = (reader.position().byte() as usize).min(bytes.len());
     let mut first = ::csv::ByteRecord::new();
     let has_rows = reader.read_byte_record(&mut first).map_err(|error| unreadable(&error))?;
-    let field = clock.filter(|_| has_rows).and_then(|k| first.get(k));
+    let field = clock.filter(|_| has_rows).and_then(|k| first.get(k)).map(<[u8]>::trim_ascii);
     let table = CsvTable { names: &names, clock, start: field.map_or(0, whole_seconds) };
     let parts = parts(&bytes[body..], 1 + line_ends(&bytes[..body]));
-    let read = in_threads(parts.len(), |k| table.rows(parts[k].0, parts[k].1));
-    let mut columns = vec![Vec::new(); names.len()];
-    let mut complaints = Vec::new();
+    let lines: u64 = parts.iter().map(|part| part.lines).sum();
+    // the first takes those of all others, too
+    let most = |k: usize| if k == 0 { lines } else { parts[k].lines } as usize;
+    let mut read = in_threads(parts.len(), |k| table.rows(&parts[k], most(k))).into_iter();
+    let (mut columns, mut complaints) = read.next().transpose()?.unwrap_or_default();
     for rows in read {
         let (more, wrong) = rows?;
         columns.iter_mut().zip(more).for_each(|(column, more): (&mut Vec<f64>, _)| column.extend(more));
@@ -54,25 +56,36 @@ pub fn read(bytes: &[u8]) -> Result<JointLog, LogError> {
     }
 }
 
+/// Spaces about names are left out; those about numbers are where they are read.
 fn reader(bytes: &[u8], has_headers: bool) -> ::csv::Reader<&[u8]> {
     let mut builder = ::csv::ReaderBuilder::new();
-    builder.trim(::csv::Trim::All).comment(Some(b'#')).flexible(true).has_headers(has_headers);
+    builder.trim(::csv::Trim::Headers).comment(Some(b'#')).flexible(true).has_headers(has_headers);
     builder.from_reader(bytes)
 }
 
-/// Rows in parts for threads, each with the number of its first line. A line that may go on behind its end, by a quotation mark, is not taken apart.
-fn parts(body: &[u8], first: u64) -> Vec<(&[u8], u64)> {
+/// Rows that a thread reads.
+struct CsvPart<'a> {
+    bytes: &'a [u8],
+    /// The number of its first line.
+    first: u64,
+    /// How many end in it.
+    lines: u64,
+}
+
+/// Rows in parts for threads. A line that may go on behind its end, by a quotation mark, is not taken apart.
+fn parts(body: &[u8], first: u64) -> Vec<CsvPart<'_>> {
     let count = (body.len() / WORTH).clamp(1, processors());
     if body.contains(&b'"') {
-        return vec![(body, first)];
+        return vec![CsvPart { bytes: body, first, lines: line_ends(body) }];
     }
     let (mut left, mut line, mut parts) = (body, first, Vec::new());
     for k in 0..count {
         let about = left.len() / (count - k);
         let end = left[about..].iter().position(|byte| *byte == b'\n').map_or(left.len(), |at| about + at + 1);
         let (part, rest) = left.split_at(end);
-        parts.push((part, line));
-        line += line_ends(part);
+        let lines = line_ends(part);
+        parts.push(CsvPart { bytes: part, first: line, lines });
+        line += lines;
         left = rest;
     }
     parts
@@ -100,11 +113,12 @@ struct CsvTable<'a> {
 }
 
 impl CsvTable<'_> {
-    /// The columns of some rows, and what is wrong in them; the first of them stands in that line.
-    fn rows(&self, bytes: &[u8], first: u64) -> Result<(Vec<Vec<f64>>, Vec<String>), LogError> {
+    /// The columns of some rows, with room for so many, and what is wrong in them.
+    fn rows(&self, part: &CsvPart, room: usize) -> Result<(Vec<Vec<f64>>, Vec<String>), LogError> {
+        let CsvPart { bytes, first, .. } = *part;
         let mut reader = reader(bytes, false);
         let (mut record, mut complaints) = (::csv::ByteRecord::new(), Vec::new());
-        let mut columns = vec![Vec::new(); self.names.len()];
+        let mut columns: Vec<Vec<f64>> = self.names.iter().map(|_| Vec::with_capacity(room + 1)).collect();
         while reader.read_byte_record(&mut record).map_err(|error| unreadable(&error))? {
             let line = || first + lines_before(bytes, record.position().map_or(0, ::csv::Position::byte) as usize);
             if record.len() != columns.len() {
@@ -112,6 +126,7 @@ impl CsvTable<'_> {
                 return Err(LogError::new(format!("line {}", line()), what, FORM));
             }
             for (k, (column, field)) in columns.iter_mut().zip(&record).enumerate() {
+                let field = field.trim_ascii();
                 let number = if Some(k) == self.clock { seconds(field, self.start) } else { number(field) };
                 if number.is_none() {
                     let (field, name) = (String::from_utf8_lossy(field), &self.names[k]);

@@ -16,6 +16,15 @@ fn a_table_with_missing_numbers_is_a_log_that_says_so() {
     assert_eq!(found.qdd.expect("it has accelerations"), [[4.0, 4.0]]);
 }
 
+/// As spreadsheets and people write them.
+#[test]
+fn spaces_and_quotation_marks_about_numbers_are_none_of_them() {
+    let log = read(b" t , q.a\n\t0.5 ,\"1\" \n0.6,\"2.5 \"\r\n 0.7 ,\t\n").expect("a log");
+    assert_eq!((&log.times[..], &log.joints[..]), (&[0.5, 0.6, 0.7][..], &["a".to_string()][..]));
+    let q = log.column(LogQuantity::Position, 0);
+    assert!(q[..2] == [1.0, 2.5] && q[2].is_nan(), "{q:?}");
+}
+
 #[test]
 fn seconds_since_the_epoch_keep_their_nanoseconds() {
     let log = read(b"t,q.a,tau.a\n1700000000.999999999,0,0\n1700000001.000000001,0,0\n").expect("a log");
