@@ -29,8 +29,9 @@ pub fn read(bytes: &[u8]) -> Result<JointLog, LogError> {
     let table = CsvTable { names: &names, clock, start: field.map_or(0, whole_seconds) };
     let parts = parts(&bytes[body..], 1 + line_ends(&bytes[..body]));
     let lines: u64 = parts.iter().map(|part| part.lines).sum();
-    // the first takes those of all others, too
-    let most = |k: usize| if k == 0 { lines } else { parts[k].lines } as usize;
+    // the first takes those of all others, too; a row has a byte for each column at least
+    let rows = |bytes: usize, lines: u64| (bytes / names.len().max(1)).min(lines as usize);
+    let most = |k: usize| if k == 0 { rows(bytes.len(), lines) } else { rows(parts[k].bytes.len(), parts[k].lines) };
     let mut read = in_threads(parts.len(), |k| table.rows(&parts[k], most(k))).into_iter();
     let (mut columns, mut complaints) = read.next().transpose()?.unwrap_or_default();
     for rows in read {
