@@ -369,7 +369,7 @@ fn models_are_attached_where_they_are_named() {
     std::fs::remove_dir_all(&here).expect("it was made here");
 }
 
-/// A ball that lies beside a robot is no part of it; two balls are no robot.
+/// A ball that lies beside a robot is no part of it, nor is a door beside a walker; two balls are no robot, and two walkers two.
 #[test]
 fn what_moves_freely_beside_a_robot_is_left_out() {
     let arm = format!("<body name=\"arm\"><joint name=\"j\" axis=\"0 1 0\"/>{INERTIAL}</body>");
@@ -382,11 +382,23 @@ fn what_moves_freely_beside_a_robot_is_left_out() {
     // beside a robot that floats, too
     let walker = format!("<body name=\"walker\"><freejoint/>{INERTIAL}{arm}</body>");
     same(&model_of("a.xml", &robot("", &format!("{walker}{ball}"))), &model_of("b.xml", &robot("", &walker)), 0.0);
-    let (model, diagnostics) = load(
-        &Source::new("c.xml", robot("", &format!("{ball}{}", ball.replace("ball", "other")))),
-        &ModelOptions::default(),
+    // and what has one joint of its own beside a robot with several, with its actuator
+    let leg = format!("<body><joint name=\"knee\" axis=\"0 1 0\"/>{INERTIAL}</body>");
+    let walker = walker.replace("</body></body>", &format!("</body>{leg}</body>"));
+    let door = format!("<body name=\"door\" pos=\"0 0 20\"><joint name=\"hinge\"/>{INERTIAL}</body>");
+    let motors = "<actuator><motor joint=\"j\"/><motor joint=\"hinge\"/></actuator>";
+    same(
+        &model_of("a.xml", &robot(motors, &format!("{door}{walker}{ball}"))),
+        &model_of("b.xml", &robot("", &walker)),
+        0.0,
     );
-    assert!(model.is_none() && diagnostics.iter().all(|d| d.code == "not-supported-yet"), "{diagnostics}");
+    let two = door.replace("</body>", &format!("{leg}</body>")).replace("knee", "latch");
+    let refused =
+        [format!("{ball}{}", ball.replace("ball", "other")), format!("{walker}{two}"), walker.clone() + &walker];
+    for bodies in refused {
+        let (model, diagnostics) = load(&Source::new("c.xml", robot("", &bodies)), &ModelOptions::default());
+        assert!(model.is_none() && diagnostics.iter().any(|d| d.code == "not-supported-yet"), "{diagnostics}");
+    }
 }
 
 fn faces() -> ([[f64; 3]; 8], [[usize; 3]; 12]) {

@@ -102,10 +102,7 @@ impl<'s> Mjcf<'s> {
             .map(|body| body.element)
             .filter(|body| !self.joints_within(body).is_empty())
             .collect();
-        // what moves freely beside a robot has nothing to do with its dynamics
-        let (objects, robots): (Vec<&'s Element>, Vec<&'s Element>) =
-            moving.iter().partition(|body| self.free_joint(body).is_some() && self.joints_within(body).len() == 1);
-        let (objects, moving) = if robots.is_empty() { (Vec::new(), moving) } else { (objects, robots) };
+        let (objects, moving) = self.objects_and_robots(moving);
         let free = moving.iter().filter(|body| self.free_joint(body).is_some()).count();
         let base = if free == 1 && moving.len() == 1 { moving.first().copied() } else { None };
         let held = base.filter(|base| self.is_held(base));
@@ -136,6 +133,23 @@ impl<'s> Mjcf<'s> {
         }
     }
 
+    /// What moves beside a robot and has nothing to do with its dynamics, and what may be the robot. Objects are bodies that move freely, and beside a robot that
+    /// floats and has several joints those that have one.
+    fn objects_and_robots(&self, moving: Vec<&'s Element>) -> (Vec<&'s Element>, Vec<&'s Element>) {
+        let joints = |body: &'s Element| self.joints_within(body).len();
+        let all = moving.iter().copied();
+        let (floating, held): (Vec<_>, Vec<_>) = all.partition(|body| self.free_joint(body).is_some());
+        let (mut objects, floating): (Vec<_>, Vec<_>) = floating.into_iter().partition(|body| joints(body) == 1);
+        let is_robot = floating.len() == 1 && joints(floating[0]) > 2;
+        let (small, held): (Vec<_>, Vec<_>) = held.into_iter().partition(|body| is_robot && joints(body) == 1);
+        objects.extend(small);
+        let robots = [floating, held].concat();
+        match robots.is_empty() {
+            true => (Vec::new(), moving),
+            false => (objects, robots),
+        }
+    }
+
     /// The bodies of the world that are read, the first one last: only `base` if there is one, and no objects.
     fn bodies_of_world(
         &mut self,
@@ -149,7 +163,7 @@ impl<'s> Mjcf<'s> {
             let why = match base {
                 _ if element.name != "body" => None,
                 _ if objects.iter().any(|object| std::ptr::eq(*object, element)) => {
-                    Some("body that moves freely beside the robot")
+                    Some("body that moves beside the robot")
                 }
                 Some(base) if !std::ptr::eq(base, element) => Some("body that does not move"),
                 _ => None,
