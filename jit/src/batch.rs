@@ -44,8 +44,8 @@ impl BatchLayout {
         (n == 1 || a > 0) && (m == 1 || b > 0) && (n == 1 || m == 1 || within(n, a, b) || within(m, b, a))
     }
 
-    /// Copies so many entries of `N` states from `first` on beside one another, those of the last of all states for lanes behind it. What stands behind
-    /// the entries in `to` may be overwritten.
+    /// Copies so many entries of `N` states from `first` on beside one another, those of the last of all states for lanes behind it. `to` has `N` more
+    /// than entries, which may be overwritten.
     #[inline(always)]
     pub(crate) fn gather<T: Number, const N: usize>(
         self,
@@ -75,15 +75,7 @@ impl BatchLayout {
                         row.iter_mut().zip(&from[lane * self.by_state..]).for_each(|(x, from)| *x = *from);
                     }
                 }
-                match to[k..].first_chunk_mut() {
-                    Some(to) => by.transpose(&rows, to),
-                    None => {
-                        let mut columns = [[T::default(); N]; N];
-                        by.transpose(&rows, &mut columns);
-                        let count = to.len() - k;
-                        to[k..].copy_from_slice(&columns[..count]);
-                    }
-                }
+                by.transpose(&rows, to[k..].first_chunk_mut().expect("there are more than entries"));
             }
             return;
         }

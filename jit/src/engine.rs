@@ -115,7 +115,7 @@ impl<T: Number> Executable<T> {
     /// Runs one state whose inputs are in the frame.
     pub fn run(&self, frame: &mut [T]) {
         match &self.code {
-            Some([code, _]) => code.run(frame),
+            Some([code, _]) => code.run_lanes::<1>(frame, code.instructions),
             None => self.interpret(frame),
         }
     }
@@ -131,12 +131,13 @@ impl<T: Number> Executable<T> {
 
     fn interpret(&self, frame: &mut [T]) {
         let (inputs, results) = frame.split_at_mut(self.tape.inputs * interpreter::LANES);
-        interpreter::run(&self.tape, inputs.as_chunks().0, results.as_chunks_mut().0);
+        let results = &mut results.as_chunks_mut().0[..self.tape.results.len()];
+        interpreter::run(&self.tape, inputs.as_chunks().0, results);
     }
 
     /// The instructions that blocks of a batch are performed by.
     pub fn instructions(&self) -> NativeInstructions {
-        self.code.as_ref().map_or(NativeInstructions::ANY, |[_, code]| code.sines)
+        self.code.as_ref().map_or(NativeInstructions::ANY, |[_, code]| code.instructions)
     }
 
     /// The first lanes of the results of one state that was run.
@@ -185,7 +186,8 @@ struct MachineCode<T> {
     /// Of each phase, the calls before it and whether it has instructions.
     phases: Vec<(PlacedCalls, bool)>,
     results: Vec<MemoryPlace>,
-    sines: NativeInstructions,
+    /// What blocks of a batch, and the sines of one state, are performed by.
+    instructions: NativeInstructions,
     is_fused: bool,
 }
 
@@ -202,8 +204,8 @@ impl<T: Number> MachineCode<T> {
         let phases = tape.phases.iter().map(placed).collect();
         let results = tape.results.iter().map(|operand| allocated.place(*operand)).collect();
         let native = pages(&functions, [frame_length, constants.len()])?;
-        let (sines, is_fused) = (NativeInstructions::best(), tape.fused);
-        Ok(MachineCode { native, lanes, frame_length, constants, phases, results, sines, is_fused })
+        let (instructions, is_fused) = (NativeInstructions::best(), tape.fused);
+        Ok(MachineCode { native, lanes, frame_length, constants, phases, results, instructions, is_fused })
     }
 }
 
@@ -216,17 +218,6 @@ impl<T: Number> MachineCode<T> {
             MemoryPlace::MinusZero => (&*self.constants, 0),
         };
         &memory[at * self.lanes..][..self.lanes]
-    }
-
-    fn run(&self, frame: &mut [T]) {
-        match self.lanes {
-            1 => self.run_lanes::<1>(frame, self.sines),
-            2 => self.run_lanes::<2>(frame, self.sines),
-            4 => self.run_lanes::<4>(frame, self.sines),
-            8 => self.run_lanes::<8>(frame, self.sines),
-            16 => self.run_lanes::<16>(frame, self.sines),
-            lanes => unreachable!("no vector has {lanes} numbers"),
-        }
     }
 
     #[inline(always)]

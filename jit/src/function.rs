@@ -457,8 +457,9 @@ impl<T: Number, const N: usize> NativeJob for Blocks<'_, '_, '_, T, N> {
         let Blocks { function, states, inputs, results } = self;
         let LoadedFunction { inputs: taken, outputs, executable, .. } = function;
         let [taken, outputs] = [taken, outputs].map(|ports| ports.iter().map(Port::len).collect::<Vec<usize>>());
-        let mut frame = vec![T::default(); executable.frame_length(true)];
         let entries: usize = outputs.iter().sum();
+        // `N` entries more are written and read along with those of a block
+        let mut frame = vec![T::default(); executable.frame_length(true) + N * N];
         let mut found = vec![[T::default(); N]; entries + N];
         for first in (0..states).step_by(N) {
             // inputs stand first in a frame, one behind the other; what is behind them is written before it is read

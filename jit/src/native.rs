@@ -155,8 +155,8 @@ impl NativeInstructions {
     }
 }
 
-/// What is compiled once for each set of instructions. All that it calls is `#[inline(always)]`, and so becomes part of functions for these instructions: numbers that
-/// machine code reads as a vector are written as one, which the store buffer hands on at once, and as several it does not.
+/// What is compiled once for each set of instructions. All that it calls is `#[inline(always)]`, and so becomes part of functions for these instructions, or has
+/// them itself: numbers that machine code reads as a vector are written as one, which the store buffer hands on at once, and as several it does not.
 pub trait NativeJob {
     /// What comes of it.
     type Output;
