@@ -252,7 +252,7 @@ impl<T: Real> Solution<'_, '_, T> {
         }
         let column = |slopes: &[T], k: usize| (0..nv).map(|i| -slopes[i * nv + k]).collect::<Vec<T>>();
         let columns = [&of_torques.dtau_dq, &of_torques.dtau_dqd].map(|slopes| (0..nv).map(|k| column(slopes, k)));
-        let solved = self.of_all(&columns.into_iter().flatten().collect::<Vec<_>>());
+        let solved = self.of_coordinates(&columns.into_iter().flatten().collect::<Vec<_>>());
         let (by_position, by_velocity) = solved.split_at(nv);
         let (mut by_position, mut by_velocity) = (by_rows(by_position), by_rows(by_velocity));
         if let Some(base) = base {

@@ -46,11 +46,11 @@ const LARGE: [CountsOf; 4] = [
     of("count_robots/general_6r.urdf", counts(3127, 3109, None), counts(4715, 4559, None)),
     CountsOf {
         floating: true,
-        ..of("../robots/descriptions/solo12.urdf", counts(4030, 3940, None), counts(19400, 15461, None))
+        ..of("../robots/descriptions/solo12.urdf", counts(4030, 3940, None), counts(19400, 15017, None))
     },
     CountsOf {
         floating: true,
-        ..of("../robots/descriptions/hyq.urdf", counts(6450, 6422, Some(17080)), counts(22200, 18268, Some(37698)))
+        ..of("../robots/descriptions/hyq.urdf", counts(6450, 6422, Some(17080)), counts(22200, 17824, Some(37698)))
     },
     CountsOf {
         file: "../robots/descriptions/simple_humanoid.urdf",

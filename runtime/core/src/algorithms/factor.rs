@@ -3,6 +3,10 @@
 //! Numbered from the base to the tips, H has a zero wherever two joints lie on different branches. Eliminated from the
 //! tips down, it keeps them all, so that a leg costs what a leg has (Featherstone 2008, section 6.3-6.5, tables 6.3-6.5).
 
+mod response;
+
+pub use response::BranchResponses;
+
 use super::crba::mass_matrix;
 use super::rnea::bias_force;
 use crate::model::{BodyId, Model};
@@ -81,19 +85,9 @@ impl<T: Real> Ltdl<T> {
         self.finish(self.half(right))
     }
 
-    /// H⁻¹, nv × nv, row-major, of a matrix whose coordinates all move: one triangle by substitution, the other as it is symmetric.
+    /// H⁻¹, nv × nv, row-major, of a matrix whose coordinates all move.
     pub fn inverse(&self) -> Vec<T> {
-        let nv = self.coordinates.len();
-        let mut inverse = vec![T::zero(); nv * nv];
-        for k in 0..nv {
-            let unit: Vec<T> = (0..nv).map(|i| if i == self.coordinates[k] { T::one() } else { T::zero() }).collect();
-            let column = self.finish_up_to(k, self.half(&unit));
-            for i in 0..=k {
-                let (i, k) = (self.coordinates[i], self.coordinates[k]);
-                (inverse[i * nv + k], inverse[k * nv + i]) = (column[i], column[i]);
-            }
-        }
-        inverse
+        self.inverse_by(&BranchResponses::default())
     }
 
     /// (H x)_i of the coordinates i that do not move: what moves the others as x says puts on them.
@@ -132,13 +126,18 @@ impl<T: Real> Ltdl<T> {
 
     /// The same of the rows up to the one given; the others are left as they were.
     pub(super) fn finish_up_to(&self, last: usize, y: Vec<T>) -> Vec<T> {
+        self.finish_by(last, y, |_, _| None)
+    }
+
+    /// The same, where x of some rows is known from x of those before them.
+    fn finish_by(&self, last: usize, y: Vec<T>, known: impl Fn(usize, &[T]) -> Option<T>) -> Vec<T> {
         let mut x = y;
         let mut solution = x.clone();
         for i in (0..x.len()).take(last + 1) {
-            x[i] = x[i] * self.inverse_pivots[i];
-            for j in up(&self.parents, i) {
-                x[i] = x[i] - self.lower[i][j] * x[j];
-            }
+            x[i] = known(i, &x).unwrap_or_else(|| {
+                let scaled = x[i] * self.inverse_pivots[i];
+                up(&self.parents, i).fold(scaled, |x_i, j| x_i - self.lower[i][j] * x[j])
+            });
             solution[self.coordinates[i]] = x[i];
         }
         solution

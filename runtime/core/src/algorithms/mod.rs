@@ -132,7 +132,7 @@ pub use driven_inverse::{
 pub use effects::{add_rotors, passive_force, rotor_forces, rotor_inertias, with_rotors_of_loops};
 pub use energy::{kinetic_energy, potential_energy};
 pub use environment::{Environment, EnvironmentMotion, SpringDamper};
-pub use factor::{forward_dynamics_ltdl, Ltdl};
+pub use factor::{forward_dynamics_ltdl, BranchResponses, Ltdl};
 pub use falling_base::FallingBase;
 pub use frame_derivatives::{frame_derivatives, FrameDerivativeBlocks};
 pub use frame_twist_derivatives::{frame_derivatives_at_world_origin, frame_derivatives_in_own_axes};

@@ -462,6 +462,32 @@ fn the_factored_mass_matrix_solves() {
 }
 
 #[test]
+fn branches_that_a_column_leaves_alone_follow_what_carries_them() {
+    let mut followed = 0;
+    for case in cases() {
+        let (nv, h) = (case.model.nv(), mass_matrix(&case.model, &case.q));
+        let (factor, responses) = (Ltdl::factor(&case.model, &h), BranchResponses::default());
+        for k in 0..nv {
+            let on_branch = |i: &usize| h[i * nv + k] != Dd::ZERO;
+            let right: Vec<Dd> = (0..nv).map(|i| if on_branch(&i) { case.qd[i] } else { Dd::ZERO }).collect();
+            followed += (0..nv).filter(|i| !on_branch(i)).count();
+            let x = factor.solve_on_branch(k, &right, &responses);
+            case.agree(&product(&h, &x), &right, DD_SOLVED);
+            case.agree(&x, &factor.solve(&right), DD_SOLVED);
+        }
+        for inverse in [factor.inverse(), factor.inverse_by(&responses)] {
+            for k in 0..nv {
+                case.agree(&product(&h, &inverse[k * nv..(k + 1) * nv]), &unit(nv, k), DD_SOLVED);
+            }
+        }
+        let mut all = factor.branches().concat();
+        all.sort_unstable();
+        assert_eq!(all, (0..nv).collect::<Vec<_>>(), "each coordinate is on one branch");
+    }
+    assert!(followed > 100, "{followed} entries are of other branches");
+}
+
+#[test]
 fn the_wrench_of_a_joint_does_its_torque_along_the_axis() {
     for case in cases() {
         let (m, tau) = (&case.model, case.inverse_dynamics());
