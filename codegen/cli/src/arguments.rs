@@ -19,6 +19,7 @@ pub use crate::logs::{Identify, Residuals};
 use crate::look_up::EXPLAIN_HELP;
 pub use crate::look_up::{Explain, Functions};
 pub use crate::motion::{Analyze, Simulate, ViewArguments};
+pub use crate::query::Query;
 
 pub const EXIT_CODES: &str = "\
 Exit codes:
@@ -124,6 +125,9 @@ Examples:
     /// The numbers of a robot that its logs tell: inertias, friction, rotors, with intervals, and the robot file with them
     #[command(after_help = crate::logs::help_of_identify())]
     Identify(Identify),
+    /// SQL over logs of many robots, by the command straightline-query (the folder fleets of a clone)
+    #[command(disable_help_flag = true)]
+    Query(Query),
     /// Write a self-contained package for other languages
     #[command(after_help = format!("\
 With `--c-abi` the directory becomes a Rust package without dependencies; `cargo build --release` in it gives a shared
@@ -163,7 +167,9 @@ impl CliCommand {
             CliCommand::Residuals(a) => return a.model(),
             CliCommand::Identify(a) => return a.model(),
             CliCommand::Export(a) => &a.model,
-            CliCommand::Convert(_) | CliCommand::Functions(_) | CliCommand::Explain(_) => return None,
+            CliCommand::Convert(_) | CliCommand::Query(_) | CliCommand::Functions(_) | CliCommand::Explain(_) => {
+                return None
+            }
         })
     }
 
@@ -171,6 +177,8 @@ impl CliCommand {
     pub fn is_quiet(&self) -> bool {
         match self {
             CliCommand::Convert(a) => a.quiet,
+            // the command that does it says what it does
+            CliCommand::Query(_) => true,
             other => other.model().is_some_and(ModelArgs::is_quiet),
         }
     }
@@ -189,6 +197,7 @@ impl CliCommand {
             CliCommand::View(_) => "drawing",
             CliCommand::Residuals(_) => "reading a log",
             CliCommand::Identify(_) => "identifying",
+            CliCommand::Query(_) => "querying",
             CliCommand::Export(_) => "exporting",
             CliCommand::Functions(_) | CliCommand::Explain(_) => "looking up",
         }

@@ -33,6 +33,7 @@ mod motion_arguments;
 mod page;
 #[cfg_attr(not(feature = "simulation"), allow(dead_code))]
 mod print;
+mod query;
 #[cfg(feature = "logs")]
 mod residuals;
 #[cfg(feature = "logs")]
@@ -65,6 +66,8 @@ use straightline_codegen::{description, identifier, model, output, scene};
 enum CommandFailure {
     /// The robot file is wrong, or a check failed.
     Input,
+    /// Another command did the work, and ended with this.
+    Handed(u8),
     /// A file could not be read or written.
     Files(io::Error),
 }
@@ -94,12 +97,14 @@ fn main() -> ExitCode {
         CliCommand::View(a) => motion::view(&a),
         CliCommand::Residuals(a) => logs::residuals(&a),
         CliCommand::Identify(a) => logs::identify(&a),
+        CliCommand::Query(a) => query::query(&a),
         CliCommand::Functions(a) => print::functions(a.word.as_deref()).map_err(CommandFailure::Files),
         CliCommand::Explain(a) => explain_code(a.code.as_deref()),
     };
     match done {
         Ok(()) => ExitCode::SUCCESS,
         Err(CommandFailure::Input) => ExitCode::from(1),
+        Err(CommandFailure::Handed(code)) => ExitCode::from(code),
         // the reader of a pipe had enough: not a failure of ours
         Err(CommandFailure::Files(error)) if error.kind() == io::ErrorKind::BrokenPipe => ExitCode::SUCCESS,
         Err(CommandFailure::Files(error)) => {

@@ -218,6 +218,36 @@ fn verify_fails_where_nothing_is_compared() {
     assert!(run.out.contains("has no formulation of driven_forward_dynamics_derivatives"), "{}", run.out);
 }
 
+/// What has an engine of queries is a command of its own, whose words, results and end are those of `query`.
+#[cfg(unix)]
+#[test]
+fn query_is_handed_on() {
+    use std::os::unix::fs::PermissionsExt;
+    let here = scratch("query");
+    let query = |words: &[&str]| {
+        let mut command = Command::new(env!("CARGO_BIN_EXE_straightline"));
+        command.arg("query").args(words).env("PATH", &here).output().unwrap()
+    };
+    let missing = query(&["SELECT 1"]);
+    let said = String::from_utf8(missing.stderr).unwrap();
+    assert_eq!(missing.status.code(), Some(1));
+    assert!(
+        said.contains("there is no command `straightline-query`") && said.contains("--path fleets/query"),
+        "{said}"
+    );
+
+    let stub = here.join("straightline-query");
+    fs::write(&stub, "#!/bin/sh\nfor word in \"$@\"; do echo \"<$word>\"; done\necho why >&2\nexit $#\n").unwrap();
+    fs::set_permissions(&stub, fs::Permissions::from_mode(0o755)).unwrap();
+    for words in [&[][..], &["--robots", "a b", "SELECT 'x'", "--", "-q"], &["--help"]] {
+        let handed = query(words);
+        assert_eq!(handed.status.code(), Some(words.len() as i32));
+        let expected: String = words.iter().map(|word| format!("<{word}>\n")).collect();
+        assert_eq!(String::from_utf8(handed.stdout).unwrap(), expected);
+        assert_eq!(String::from_utf8(handed.stderr).unwrap(), "why\n");
+    }
+}
+
 #[test]
 fn bench_measures_every_function_without_a_compiler() {
     for more in [&["--scalar", "f64"][..], &["--scalar", "f32"], &["--fma"]] {
