@@ -40,7 +40,7 @@ mod dispatch {
     }
 }
 
-use core::ffi::{c_int, c_long};
+use core::ffi::c_int;
 use dynamics::{NQ, NV};
 
 #[cfg(not(feature = "single"))]
@@ -52,6 +52,7 @@ type Number = f32;
 #[cfg(not(any(feature = "single", feature = "derivatives")))]
 mod calls {
     use super::*;
+    use core::ffi::c_long;
     use core::slice::{from_raw_parts, from_raw_parts_mut};
 
     type Q = [f64; NQ];
@@ -105,8 +106,7 @@ mod calls {
 #[cfg(all(feature = "derivatives", not(feature = "single")))]
 mod derivative_calls {
     use super::*;
-    use core::slice::{from_raw_parts, from_raw_parts_mut};
-    use std::cell::{RefCell, UnsafeCell};
+    use std::cell::UnsafeCell;
 
     type Q = [f64; NQ];
     type V = [f64; NV];
@@ -114,7 +114,6 @@ mod derivative_calls {
 
     thread_local! {
         static SQUARE: UnsafeCell<Square> = const { UnsafeCell::new([[0.0; NV]; NV]) };
-        static SQUARES: RefCell<Vec<f64>> = const { RefCell::new(Vec::new()) };
     }
 
     #[no_mangle]
@@ -136,110 +135,129 @@ mod derivative_calls {
         }
     }
 
-    macro_rules! batch {
-        ($name:ident, $function:ident) => {
-            #[no_mangle]
-            pub unsafe extern "C" fn $name(n: c_long, q: *const f64, v: *const f64, x: *const f64, y: *mut f64) {
-                let n = n as usize;
-                let (q, v, x) = (from_raw_parts(q, n * NQ), from_raw_parts(v, n * NV), from_raw_parts(x, n * NV));
-                let (by_q, by_v) = from_raw_parts_mut(y, 2 * n * NV * NV).split_at_mut(n * NV * NV);
-                SQUARES.with_borrow_mut(|h| {
-                    h.resize(n * NV * NV, 0.0);
-                    dynamics::$function(n, q, v, x, by_q, by_v, h).expect("the slices hold n states");
-                });
-            }
-        };
+    #[cfg(not(feature = "calls"))]
+    mod batches {
+        use super::*;
+        use core::ffi::c_long;
+        use core::slice::{from_raw_parts, from_raw_parts_mut};
+        use std::cell::RefCell;
+
+        thread_local! {
+            static SQUARES: RefCell<Vec<f64>> = const { RefCell::new(Vec::new()) };
+        }
+
+        macro_rules! batch {
+            ($name:ident, $function:ident) => {
+                #[no_mangle]
+                pub unsafe extern "C" fn $name(n: c_long, q: *const f64, v: *const f64, x: *const f64, y: *mut f64) {
+                    let n = n as usize;
+                    let (q, v, x) = (from_raw_parts(q, n * NQ), from_raw_parts(v, n * NV), from_raw_parts(x, n * NV));
+                    let (by_q, by_v) = from_raw_parts_mut(y, 2 * n * NV * NV).split_at_mut(n * NV * NV);
+                    SQUARES.with_borrow_mut(|h| {
+                        h.resize(n * NV * NV, 0.0);
+                        dynamics::$function(n, q, v, x, by_q, by_v, h).expect("the slices hold n states");
+                    });
+                }
+            };
+        }
+        batch!(rbd_id_deriv_batch_soa, inverse_dynamics_derivatives_batch_soa);
+        batch!(rbd_fd_deriv_batch_soa, forward_dynamics_derivatives_batch_soa);
+
+        /// Blocks of eight states, one after the other.
+        macro_rules! blocks {
+            ($name:ident, $function:ident) => {
+                #[no_mangle]
+                pub unsafe extern "C" fn $name(n: c_long, q: *const f64, v: *const f64, x: *const f64, y: *mut f64) {
+                    type Lanes<const K: usize> = [[f64; 8]; K];
+                    type Squares = [[[f64; 8]; NV]; NV];
+                    let blocks = n as usize / 8;
+                    let q: &[Lanes<NQ>] = from_raw_parts(q.cast(), blocks);
+                    let (v, x): (&[Lanes<NV>], &[Lanes<NV>]) =
+                        (from_raw_parts(v.cast(), blocks), from_raw_parts(x.cast(), blocks));
+                    let y: &mut [[Squares; 2]] = from_raw_parts_mut(y.cast(), blocks);
+                    SQUARES.with_borrow_mut(|h| {
+                        h.resize(n as usize * NV * NV, 0.0);
+                        let h: &mut [Squares] = from_raw_parts_mut(h.as_mut_ptr().cast(), blocks);
+                        for (k, (y, h)) in y.iter_mut().zip(h).enumerate() {
+                            let [by_q, by_v] = y;
+                            dynamics::$function(&q[k], &v[k], &x[k], by_q, by_v, h);
+                        }
+                    });
+                }
+            };
+        }
+        blocks!(rbd_id_deriv_batch_blocks, inverse_dynamics_derivatives_lanes);
+        blocks!(rbd_fd_deriv_batch_blocks, forward_dynamics_derivatives_lanes);
     }
-    batch!(rbd_id_deriv_batch_soa, inverse_dynamics_derivatives_batch_soa);
-    batch!(rbd_fd_deriv_batch_soa, forward_dynamics_derivatives_batch_soa);
+}
 
-    /// Blocks of eight states, one after the other.
-    macro_rules! blocks {
-        ($name:ident, $function:ident) => {
-            #[no_mangle]
-            pub unsafe extern "C" fn $name(n: c_long, q: *const f64, v: *const f64, x: *const f64, y: *mut f64) {
-                type Lanes<const K: usize> = [[f64; 8]; K];
-                type Squares = [[[f64; 8]; NV]; NV];
-                let blocks = n as usize / 8;
-                let q: &[Lanes<NQ>] = from_raw_parts(q.cast(), blocks);
-                let (v, x): (&[Lanes<NV>], &[Lanes<NV>]) =
-                    (from_raw_parts(v.cast(), blocks), from_raw_parts(x.cast(), blocks));
-                let y: &mut [[Squares; 2]] = from_raw_parts_mut(y.cast(), blocks);
-                SQUARES.with_borrow_mut(|h| {
-                    h.resize(n as usize * NV * NV, 0.0);
-                    let h: &mut [Squares] = from_raw_parts_mut(h.as_mut_ptr().cast(), blocks);
-                    for (k, (y, h)) in y.iter_mut().zip(h).enumerate() {
-                        let [by_q, by_v] = y;
-                        dynamics::$function(&q[k], &v[k], &x[k], by_q, by_v, h);
-                    }
-                });
-            }
-        };
+/// Batches that `single.py` runs.
+#[cfg(not(feature = "calls"))]
+mod batches {
+    use super::*;
+    use core::ffi::c_long;
+
+    /// Random states, structure of arrays, and room for results.
+    pub struct Batch {
+        states: usize,
+        inputs: [&'static mut [Number]; 3],
+        results: [&'static mut [Number]; RESULTS],
     }
-    blocks!(rbd_id_deriv_batch_blocks, inverse_dynamics_derivatives_lanes);
-    blocks!(rbd_fd_deriv_batch_blocks, forward_dynamics_derivatives_lanes);
-}
 
-/// Random states, structure of arrays, and room for results.
-pub struct Batch {
-    states: usize,
-    inputs: [&'static mut [Number]; 3],
-    results: [&'static mut [Number]; RESULTS],
-}
+    /// Blocks of results, and numbers of each.
+    #[cfg(not(feature = "derivatives"))]
+    const RESULTS: usize = 1;
+    #[cfg(feature = "derivatives")]
+    const RESULTS: usize = 3;
+    const LENGTH: usize = if RESULTS == 1 { NV } else { NV * NV };
 
-/// Blocks of results, and numbers of each.
-#[cfg(not(feature = "derivatives"))]
-const RESULTS: usize = 1;
-#[cfg(feature = "derivatives")]
-const RESULTS: usize = 3;
-const LENGTH: usize = if RESULTS == 1 { NV } else { NV * NV };
+    /// Numbers that begin where a line of a cache does, as those of the harness do; they are never freed.
+    fn aligned(numbers: impl ExactSizeIterator<Item = Number>) -> &'static mut [Number] {
+        const LINE: usize = 64 / size_of::<Number>();
+        let count = numbers.len();
+        let mut room: Vec<Number> = Vec::with_capacity(count + LINE);
+        let first = room.as_ptr().align_offset(64);
+        room.resize(first, 0.0);
+        room.extend(numbers);
+        &mut room.leak()[first..]
+    }
 
-/// Numbers that begin where a line of a cache does, as those of the harness do; they are never freed.
-fn aligned(numbers: impl ExactSizeIterator<Item = Number>) -> &'static mut [Number] {
-    const LINE: usize = 64 / size_of::<Number>();
-    let count = numbers.len();
-    let mut room: Vec<Number> = Vec::with_capacity(count + LINE);
-    let first = room.as_ptr().align_offset(64);
-    room.resize(first, 0.0);
-    room.extend(numbers);
-    &mut room.leak()[first..]
-}
-
-/// A batch for [`batch_run`], which is never freed.
-#[no_mangle]
-pub extern "C" fn batch_of(states: c_long) -> *mut Batch {
-    let states = states as usize;
-    let mut seed = 1_u32;
-    let mut random = |width: usize| {
-        let mut next = || {
-            seed = seed.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
-            (seed as f32 / u32::MAX as f32 * 2.0 - 1.0) as Number
+    /// A batch for [`batch_run`], which is never freed.
+    #[no_mangle]
+    pub extern "C" fn batch_of(states: c_long) -> *mut Batch {
+        let states = states as usize;
+        let mut seed = 1_u32;
+        let mut random = |width: usize| {
+            let mut next = || {
+                seed = seed.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+                (seed as f32 / u32::MAX as f32 * 2.0 - 1.0) as Number
+            };
+            aligned((0..states * width).map(|_| next()))
         };
-        aligned((0..states * width).map(|_| next()))
-    };
-    let inputs = [random(NQ), random(NV), random(NV)];
-    let results = [(); RESULTS].map(|()| aligned((0..states * LENGTH).map(|_| 0.0)));
-    Box::into_raw(Box::new(Batch { states, inputs, results }))
-}
+        let inputs = [random(NQ), random(NV), random(NV)];
+        let results = [(); RESULTS].map(|()| aligned((0..states * LENGTH).map(|_| 0.0)));
+        Box::into_raw(Box::new(Batch { states, inputs, results }))
+    }
 
-/// Inverse dynamics (0) or forward dynamics (1) of the batch, or their derivatives; its first result.
-#[no_mangle]
-pub unsafe extern "C" fn batch_run(batch: &mut Batch, function: c_int) -> f64 {
-    let Batch { states, inputs: [q, v, x], results } = batch;
-    #[cfg(not(feature = "derivatives"))]
-    let [first] = results;
-    #[cfg(not(feature = "derivatives"))]
-    let done = match function {
-        0 => dynamics::inverse_dynamics_batch_soa(*states, q, v, x, first),
-        _ => dynamics::forward_dynamics_batch_soa(*states, q, v, x, first),
-    };
-    #[cfg(feature = "derivatives")]
-    let [first, by_v, h] = results;
-    #[cfg(feature = "derivatives")]
-    let done = match function {
-        0 => dynamics::inverse_dynamics_derivatives_batch_soa(*states, q, v, x, first, by_v, h),
-        _ => dynamics::forward_dynamics_derivatives_batch_soa(*states, q, v, x, first, by_v, h),
-    };
-    done.expect("the slices hold so many states");
-    first[0] as f64
+    /// Inverse dynamics (0) or forward dynamics (1) of the batch, or their derivatives; its first result.
+    #[no_mangle]
+    pub unsafe extern "C" fn batch_run(batch: &mut Batch, function: c_int) -> f64 {
+        let Batch { states, inputs: [q, v, x], results } = batch;
+        #[cfg(not(feature = "derivatives"))]
+        let [first] = results;
+        #[cfg(not(feature = "derivatives"))]
+        let done = match function {
+            0 => dynamics::inverse_dynamics_batch_soa(*states, q, v, x, first),
+            _ => dynamics::forward_dynamics_batch_soa(*states, q, v, x, first),
+        };
+        #[cfg(feature = "derivatives")]
+        let [first, by_v, h] = results;
+        #[cfg(feature = "derivatives")]
+        let done = match function {
+            0 => dynamics::inverse_dynamics_derivatives_batch_soa(*states, q, v, x, first, by_v, h),
+            _ => dynamics::forward_dynamics_derivatives_batch_soa(*states, q, v, x, first, by_v, h),
+        };
+        done.expect("the slices hold so many states");
+        first[0] as f64
+    }
 }
