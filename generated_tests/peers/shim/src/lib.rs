@@ -43,11 +43,6 @@ mod dispatch {
 use core::ffi::c_int;
 use dynamics::{NQ, NV};
 
-#[cfg(not(feature = "single"))]
-type Number = f64;
-#[cfg(feature = "single")]
-type Number = f32;
-
 /// The functions that the harness calls.
 #[cfg(not(any(feature = "single", feature = "derivatives")))]
 mod calls {
@@ -196,6 +191,11 @@ mod derivative_calls {
 mod batches {
     use super::*;
     use core::ffi::c_long;
+
+    #[cfg(not(feature = "single"))]
+    type Number = f64;
+    #[cfg(feature = "single")]
+    type Number = f32;
 
     /// Random states, structure of arrays, and room for results.
     pub struct Batch {
