@@ -32,6 +32,11 @@ impl<K: Hash + Eq + Clone, V: Clone> BoundedMap<K, V> {
         self.slot(key).get_or_init(make).clone()
     }
 
+    /// Without this value, if it is there.
+    pub fn forget(&self, key: &K) {
+        self.inner.lock().unwrap_or_else(PoisonError::into_inner).slots.remove(key);
+    }
+
     /// How many there are.
     pub fn count(&self) -> usize {
         self.inner.lock().unwrap_or_else(PoisonError::into_inner).slots.len()
@@ -68,5 +73,7 @@ mod tests {
         }
         assert_eq!(made, [1, 2, 3, 2]);
         assert_eq!(map.count(), 2);
+        map.forget(&1);
+        assert_eq!(map.count(), 1);
     }
 }

@@ -41,10 +41,24 @@ pub fn unreadable(name: &str, file: &Path, why: &dyn Display) -> DataFusionError
     while_planning(format!("`{name}` cannot be read: {file}: {why}\nhelp: names count from the folder of robots"))
 }
 
-/// A place other than a file.
+/// A place that is neither a file nor an address.
 pub fn not_a_file(name: &str, scheme: &str) -> DataFusionError {
     while_planning(format!(
-        "`{name}` is not read by `{scheme}`: robots are files\nhelp: copy it into the folder of robots; the hash behind `#sha256:` says that it is the same"
+        "`{name}` is not read by `{scheme}`: robots are files, or have an address of `http` or `https`\nhelp: copy it into the folder of robots; the hash behind `#sha256:` says that it is the same"
+    ))
+}
+
+/// An address that may answer something else tomorrow.
+pub fn address_without_hash(name: &str) -> DataFusionError {
+    while_planning(format!(
+        "`{name}` has no hash\nhelp: write `#sha256:` and the hash of the file behind the address, as `sha256sum` prints it, so that the query says which robot it means"
+    ))
+}
+
+/// An address that does not answer, or not with a file.
+pub fn unreachable(name: &str, why: &dyn Display) -> DataFusionError {
+    while_planning(format!(
+        "`{name}` cannot be fetched: {why}\nhelp: who plans the query fetches it, within 30 s and up to 64 MB; a copy in the folder of robots serves as well"
     ))
 }
 

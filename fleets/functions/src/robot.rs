@@ -104,7 +104,7 @@ pub fn carried(function: &str, literal: &ScalarValue, folder: &RobotFolder, of: 
 /// What the plan of a table carries of a robot that a query names: its text, found sound.
 ///
 /// # Errors
-/// As [`carried`].
+/// What is wrong with the name, the file, or the robot in it.
 pub fn robot_literal(table: &str, name: &str, folder: &RobotFolder) -> Result<ScalarValue> {
     carried(table, &ScalarValue::from(name), folder, RobotUse::Joints)
 }
@@ -132,8 +132,15 @@ fn read(function: &str, literal: &ScalarValue, folder: &RobotFolder, of: RobotUs
     };
     let file = folder.file(written);
     let key = (file.clone().unwrap_or_default(), written.to_string(), file.as_deref().and_then(stamp));
-    let text = TEXTS.get_or_make(key, || folder.read(written).map(|(text, _)| Arc::new(text)).map_err(Arc::new));
-    let text = text.map_err(again)?;
+    let text = TEXTS
+        .get_or_make(key.clone(), || folder.read(written).map(|(text, _)| Arc::new(text)).map_err(Arc::new))
+        .map_err(|wrong| {
+            // files have a time by which they are read again; an address is asked again
+            if file.is_none() {
+                TEXTS.forget(&key);
+            }
+            again(wrong)
+        })?;
     loaded(CarriedText { name: &text.name, hash: &text.hash, bytes: &text.bytes }, file.as_deref(), of)?;
     Ok(text)
 }

@@ -7,6 +7,7 @@ use datafusion::scalar::ScalarValue;
 use sha2::{Digest, Sha256};
 use std::fmt::Write;
 use std::path::{Path, PathBuf};
+use std::time::Duration;
 
 /// What the bytes of a text in a plan begin with.
 const MARK: &[u8] = b"straightline robot 1\n";
@@ -14,6 +15,10 @@ const MARK: &[u8] = b"straightline robot 1\n";
 const HASH: &str = "#sha256:";
 /// Bytes of a hash.
 const HASH_BYTES: usize = 32;
+/// How long an address may take to answer, from the first byte to the last.
+const PATIENCE: Duration = Duration::from_secs(30);
+/// Bytes of a robot file from an address at most.
+const MOST_BYTES: u64 = 64 << 20;
 
 /// The text of a robot file.
 #[derive(Clone, Debug, PartialEq, Eq, Hash)]
@@ -41,34 +46,43 @@ impl RobotFolder {
         RobotFolder(None)
     }
 
-    /// The file of a literal, without its hash, and the hash.
-    fn place<'a>(&self, literal: &'a str) -> Result<(PathBuf, &'a str, Option<&'a str>)> {
+    /// What a literal says.
+    fn place<'a>(&self, literal: &'a str) -> Result<NamedPlace<'a>> {
         let (name, hash) = literal.rsplit_once(HASH).map_or((literal, None), |(name, hash)| (name, Some(hash)));
         let Some(folder) = &self.0 else { return Err(failure::unread(name)) };
-        let path = match name.split_once("://") {
-            None => name,
-            Some(("file", path)) => path,
-            Some((scheme, _)) => return Err(failure::not_a_file(name, scheme)),
-        };
         if let Some(hash) = hash {
             let is_hash = hash.len() == 2 * HASH_BYTES && hash.bytes().all(|b| b.is_ascii_hexdigit());
             if !is_hash {
                 return Err(failure::no_hash(name, hash));
             }
         }
-        Ok((folder.join(path), name, hash))
+        let place = match name.split_once("://") {
+            None => RobotPlace::File(folder.join(name)),
+            Some(("file", path)) => RobotPlace::File(folder.join(path)),
+            Some(("http" | "https", _)) if hash.is_some() => RobotPlace::Address,
+            Some(("http" | "https", _)) => return Err(failure::address_without_hash(name)),
+            Some((scheme, _)) => return Err(failure::not_a_file(name, scheme)),
+        };
+        Ok(NamedPlace { name, place, hash })
     }
 
-    /// Reads what a literal says: `panda.urdf`, `file:///robots/panda.urdf`, each with `#sha256:…` behind it or not.
+    /// Reads what a literal says: `panda.urdf`, `file:///robots/panda.urdf`, each with `#sha256:…` behind it or not, or `https://host/panda.urdf` with it;
+    /// and the file, if it is one.
     ///
     /// # Errors
-    /// The file cannot be read, is another one than the hash says, or there is no folder.
-    pub fn read(&self, literal: &str) -> Result<(RobotText, PathBuf)> {
-        let (file, name, wanted) = self.place(literal)?;
-        let bytes = std::fs::read(&file).map_err(|why| failure::unreadable(name, &file, &why))?;
+    /// It cannot be read, is another one than the hash says, or there is no folder.
+    pub fn read(&self, literal: &str) -> Result<(RobotText, Option<PathBuf>)> {
+        let NamedPlace { name, place, hash } = self.place(literal)?;
+        let (bytes, file) = match place {
+            RobotPlace::File(file) => {
+                let bytes = std::fs::read(&file).map_err(|why| failure::unreadable(name, &file, &why))?;
+                (bytes, Some(file))
+            }
+            RobotPlace::Address => (fetched(name).map_err(|why| failure::unreachable(name, &why))?, None),
+        };
         let text = RobotText::new(name, bytes);
         let found = hexadecimal(&text.hash);
-        match wanted.map(str::to_ascii_lowercase) {
+        match hash.map(str::to_ascii_lowercase) {
             Some(wanted) if wanted != found => Err(failure::other_hash(name, &wanted, &found)),
             _ => Ok((text, file)),
         }
@@ -76,8 +90,31 @@ impl RobotFolder {
 
     /// The file that a literal names, if it names one.
     pub fn file(&self, literal: &str) -> Option<PathBuf> {
-        self.place(literal).ok().map(|(file, ..)| file)
+        match self.place(literal).ok()?.place {
+            RobotPlace::File(file) => Some(file),
+            RobotPlace::Address => None,
+        }
     }
+}
+
+/// What a literal names.
+struct NamedPlace<'a> {
+    /// Without the hash.
+    name: &'a str,
+    place: RobotPlace,
+    hash: Option<&'a str>,
+}
+
+enum RobotPlace {
+    File(PathBuf),
+    /// The name is where it is fetched from.
+    Address,
+}
+
+/// What an address answers.
+fn fetched(address: &str) -> std::result::Result<Vec<u8>, ureq::Error> {
+    let agent = ureq::Agent::config_builder().timeout_global(Some(PATIENCE)).build().new_agent();
+    agent.get(address).call()?.body_mut().with_config().limit(MOST_BYTES).read_to_vec()
 }
 
 impl RobotText {

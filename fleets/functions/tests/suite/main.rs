@@ -1,5 +1,6 @@
 //! Tests of the functions, in one binary.
 
+mod addresses;
 mod equations;
 mod helpers;
 mod lists;

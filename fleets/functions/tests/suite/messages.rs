@@ -82,7 +82,7 @@ fn what_is_no_robot_is_refused() {
     for (sql, wanted) in [
         (
             "SELECT gravity_force('s3://fleet/panda.urdf', q) FROM logs",
-            "`s3://fleet/panda.urdf` is not read by `s3`: robots are files\n\
+            "`s3://fleet/panda.urdf` is not read by `s3`: robots are files, or have an address of `http` or `https`\n\
              help: copy it into the folder of robots; the hash behind `#sha256:` says that it is the same",
         ),
         (
