@@ -15,7 +15,7 @@ use straightline_logs::condition::MatrixCondition;
 use straightline_simulation::optimize::descend;
 
 /// Harmonics of each joint.
-const HARMONICS: usize = 5;
+const HARMONICS: usize = 8;
 /// Coefficients of a joint: its centre, and two of each harmonic but the last.
 const PER_JOINT: usize = 1 + 2 * (HARMONICS - 1);
 /// Instants of a period at which the regressor is evaluated.
