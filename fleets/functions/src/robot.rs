@@ -132,9 +132,8 @@ fn read(function: &str, literal: &ScalarValue, folder: &RobotFolder, of: RobotUs
     };
     let file = folder.file(written);
     let key = (file.clone().unwrap_or_default(), written.to_string(), file.as_deref().and_then(stamp));
-    let text = TEXTS
-        .get_or_make(key.clone(), || folder.read(written).map(|(text, _)| Arc::new(text)).map_err(Arc::new))
-        .map_err(|wrong| {
+    let text =
+        TEXTS.get_or_make(key.clone(), || folder.read(written).map(Arc::new).map_err(Arc::new)).map_err(|wrong| {
             // files have a time by which they are read again; an address is asked again
             if file.is_none() {
                 TEXTS.forget(&key);

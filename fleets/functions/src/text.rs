@@ -66,25 +66,21 @@ impl RobotFolder {
         Ok(NamedPlace { name, place, hash })
     }
 
-    /// Reads what a literal says: `panda.urdf`, `file:///robots/panda.urdf`, each with `#sha256:…` behind it or not, or `https://host/panda.urdf` with it;
-    /// and the file, if it is one.
+    /// Reads what a literal says: `panda.urdf`, `file:///robots/panda.urdf`, each with `#sha256:…` behind it or not, or `https://host/panda.urdf` with it.
     ///
     /// # Errors
     /// It cannot be read, is another one than the hash says, or there is no folder.
-    pub fn read(&self, literal: &str) -> Result<(RobotText, Option<PathBuf>)> {
+    pub fn read(&self, literal: &str) -> Result<RobotText> {
         let NamedPlace { name, place, hash } = self.place(literal)?;
-        let (bytes, file) = match place {
-            RobotPlace::File(file) => {
-                let bytes = std::fs::read(&file).map_err(|why| failure::unreadable(name, &file, &why))?;
-                (bytes, Some(file))
-            }
-            RobotPlace::Address => (fetched(name).map_err(|why| failure::unreachable(name, &why))?, None),
-        };
+        let bytes = match place {
+            RobotPlace::File(file) => std::fs::read(&file).map_err(|why| failure::unreadable(name, &file, &why)),
+            RobotPlace::Address => fetched(name).map_err(|why| failure::unreachable(name, &why)),
+        }?;
         let text = RobotText::new(name, bytes);
         let found = hexadecimal(&text.hash);
         match hash.map(str::to_ascii_lowercase) {
             Some(wanted) if wanted != found => Err(failure::other_hash(name, &wanted, &found)),
-            _ => Ok((text, file)),
+            _ => Ok(text),
         }
     }
 

@@ -71,7 +71,7 @@ impl TableFunctionImpl for SweepTable {
             return Err(failure::arguments(args.exprs().len()));
         };
         let robot = robot_literal("sweep", text("robot", robot)?, &self.folder)?;
-        let experiment = self.folder.read(text("experiment", experiment)?)?.0.literal();
+        let experiment = self.folder.read(text("experiment", experiment)?)?.literal();
         let ranges = text("ranges", ranges)?;
         let samples = whole("samples", samples, 1, MOST_SAMPLES)?;
         let seed = whole("seed", seed, i64::MIN, i64::MAX)? as u64;
