@@ -330,6 +330,7 @@ impl Around<'_, '_, '_> {
         let mut known: FxHashMap<usize, KnownNames> = FxHashMap::default();
         let of_root = KnownNames { trig, short_sines, fused: [fused, false, false], generic: false };
         known.insert(root, of_root);
+        let mut globs = Vec::new();
         for item in items.all.iter().filter(|item| item.sort == Sort::Use) {
             let above = |n: usize| (0..n).fold(item.module, |m, _| items.modules[m].parent);
             let text: String = (item.start..item.end).map(|at| items.text_of(at)).collect::<Vec<_>>().join(" ");
@@ -364,9 +365,18 @@ impl Around<'_, '_, '_> {
             } else if text == "use super : : super : : { number , Dd , Real } ;" && number && of_a_mode {
                 here.generic = true;
             } else if is_of_batches(&text) {
+            } else if text == "use super : : * ;" && !items.is_root(item.module) {
+                globs.push(item);
+                continue;
             } else if !is_inner || !self.is_of_parameters(item) {
                 continue;
             }
+            item.claimed.set(true);
+        }
+        // modules of parts come behind what is around them
+        for item in globs {
+            let around = known.get(&items.modules[item.module].parent).copied().unwrap_or_default();
+            known.insert(item.module, around);
             item.claimed.set(true);
         }
         Ok(known)

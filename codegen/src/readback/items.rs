@@ -286,7 +286,7 @@ impl<'t> Items<'t> {
     }
 
     /// Whether a module is the text itself, or the same in another scalar.
-    fn is_root(&self, module: usize) -> bool {
+    pub fn is_root(&self, module: usize) -> bool {
         let TextModule { parent, name } = self.modules[module];
         module == 0 || parent == 0 && matches!(name, t::SINGLE | t::DOUBLE)
     }
@@ -331,9 +331,14 @@ impl<'t> Items<'t> {
         }
     }
 
+    /// The place of an item, by its name.
+    pub fn find_place(&self, module: usize, sort: Sort, name: u32) -> Option<usize> {
+        self.named.get(&(module, sort, name)).copied()
+    }
+
     /// An item by its name.
     pub fn find(&self, module: usize, sort: Sort, name: u32) -> Option<&TextItem> {
-        self.named.get(&(module, sort, name)).map(|k| &self.all[*k])
+        self.find_place(module, sort, name).map(|k| &self.all[k])
     }
 
     /// A module in a module.

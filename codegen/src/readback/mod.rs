@@ -271,8 +271,7 @@ impl<'g> TextPart<'g> {
             let own = if wanted.format == TextFormat::Any { plain } else { wanted.format };
             self.values.forget();
             let count = words.len();
-            let known = known.get(&module).copied().unwrap_or_default();
-            let mut run = Execution::new(items, &mut self.values, &mut signatures, count, (module, known, own));
+            let mut run = Execution::new(items, &mut self.values, &mut signatures, count, (&known, own));
             wanted.compare(&mut run, item, items, words)?;
         }
         Ok(())

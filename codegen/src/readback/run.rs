@@ -79,6 +79,8 @@ pub struct Execution<'a, 't> {
     items: &'a Items<'t>,
     values: &'a mut Values,
     functions: &'a mut FxHashMap<usize, Rc<TextFunction>>,
+    /// What each module knows.
+    known_in: &'a FxHashMap<usize, KnownNames>,
     known: KnownNames,
     module: usize,
     /// The format of functions that are not generic.
@@ -105,14 +107,15 @@ impl<'a, 't> Execution<'a, 't> {
         values: &'a mut Values,
         functions: &'a mut FxHashMap<usize, Rc<TextFunction>>,
         words: usize,
-        (module, known, plain): (usize, KnownNames, TextFormat),
+        (known_in, plain): (&'a FxHashMap<usize, KnownNames>, TextFormat),
     ) -> Execution<'a, 't> {
         Execution {
             items,
             values,
             functions,
-            known,
-            module,
+            known_in,
+            known: KnownNames::default(),
+            module: 0,
             plain,
             at: 0,
             depth: 0,
@@ -161,6 +164,7 @@ impl<'a, 't> Execution<'a, 't> {
             return items.stop(self.at, "a call with another number of arguments");
         }
         let (at, own, given, count) = (self.at, self.own, self.given, self.locals.len());
+        let (module, known) = (self.module, self.known);
         for (parameter, argument) in function.parameters.iter().zip(arguments) {
             if !self.fits(*argument, &parameter.of) {
                 return items.stop(self.at, "an argument of another type");
@@ -175,12 +179,15 @@ impl<'a, 't> Execution<'a, 't> {
             self.bind(parameter.name, *argument);
         }
         self.depth += 1;
+        self.module = items.all[item].module;
+        self.known = self.known_in.get(&self.module).copied().unwrap_or_default();
         self.at = function.body;
         let format = if function.generics.contains(&t::T) { TextFormat::Any } else { self.plain };
         self.block(&function, format)?;
         self.depth -= 1;
         self.unbind(count);
         (self.at, self.own, self.given) = (at, own, given);
+        (self.module, self.known) = (module, known);
         Ok(())
     }
 

@@ -127,10 +127,25 @@ impl Target for Rust {
         out.push_str("}\n");
         for part in &routine.parts {
             out.push('\n');
-            out.push_str(&self.routine(part));
+            out.push_str(&match in_a_module(part) {
+                true => module_of_part(&part.name, &self.routine(part)),
+                false => self.routine(part),
+            });
         }
         out
     }
+}
+
+/// Whether a part stands in a module of its own: rustc compiles modules at once, and functions of one module one after the other. What is
+/// over lanes becomes part of its callers.
+fn in_a_module(part: &Routine) -> bool {
+    !part.style.lanes
+}
+
+/// A part in a module of its name, which takes what the one around it has.
+fn module_of_part(name: &str, text: &str) -> String {
+    let uses = "    #[allow(unused_imports, clippy::wildcard_imports)]\n    use super::*;\n";
+    format!("mod {name} {{\n{uses}\n{}}}\n", super::indented(text))
 }
 
 impl Rust {
@@ -208,7 +223,8 @@ fn head(routine: &Routine) -> String {
         (false, Access::Part) => "\n#[inline(never)]",
         (false, _) => "",
     };
-    let word = if *access == Access::Public { "pub fn" } else { "fn" };
+    let is_public = *access == Access::Public || *access == Access::Part && in_a_module(routine);
+    let word = if is_public { "pub fn" } else { "fn" };
     let parameters: Vec<String> = routine.parameters.iter().map(|p| parameter(routine, p)).collect();
     format!("{ALLOW}{inline}\n{word} {name}{}({}) {{\n", generics(*style), parameters.join(", "))
 }
@@ -230,7 +246,7 @@ fn parameter(routine: &Routine, parameter: &RoutineParameter) -> String {
     }
 }
 
-/// `name_part2(q, &mut live, tau);`
+/// `name_part2::name_part2(q, &mut live, tau);`, over lanes `name_part2(q, &mut live, tau);`
 fn call_of_part(routine: &Routine, k: usize) -> String {
     let (part, ports) = (&routine.parts[k], &routine.ports);
     let argument = |p: &RoutineParameter| match p {
@@ -240,7 +256,8 @@ fn call_of_part(routine: &Routine, k: usize) -> String {
     };
     let arguments: Vec<String> = part.parameters.iter().map(argument).collect();
     let generic = if routine.style.lanes && routine.style.fused { "::<N, FUSED>" } else { "" };
-    format!("{}{generic}({});", part.name, arguments.join(", "))
+    let module = if in_a_module(part) { format!("{}::", part.name) } else { String::new() };
+    format!("{module}{}{generic}({});", part.name, arguments.join(", "))
 }
 
 /// Locals of all formats, those of one format together.

@@ -72,11 +72,18 @@ impl<'t> Execution<'_, 't> {
         self.mark(b';')
     }
 
-    /// `name_part2(q, &mut live, tau);`, or the same as the last thing of a function.
+    /// `name_part2::name_part2(q, &mut live, tau);`, `name_part2(q, &mut live, tau);`, or the same as the last thing of a function.
     pub(super) fn statement_call(&mut self, function: &TextFunction, end: usize) -> Ran<()> {
         let start = self.at;
-        let name = self.word()?;
-        let Some(item) = self.items.named.get(&(self.module, Sort::Function, name)).copied() else {
+        let mut name = self.word()?;
+        let mut module = Some(self.module);
+        if self.kind() == TokenKind::Mark(b':') && matches!(self.ahead(2), TokenKind::Word(_)) {
+            module = self.items.inner(self.module, name);
+            self.these(": :")?;
+            name = self.word()?;
+        }
+        let item = module.and_then(|module| self.items.find_place(module, Sort::Function, name));
+        let Some(item) = item.filter(|item| self.is_visible(*item)) else {
             return self.items.stop(start, "a call of something that is not known");
         };
         let mut given = Vec::new();
@@ -107,6 +114,12 @@ impl<'t> Execution<'_, 't> {
             self.mark(b';')?;
         }
         Ok(())
+    }
+
+    /// Whether a function may be called from here: one of an inner module is public.
+    fn is_visible(&self, item: usize) -> bool {
+        let item = &self.items.all[item];
+        item.module == self.module || self.items.kind(item.start) == TokenKind::Word(t::PUB)
     }
 
     pub(super) fn argument(&mut self) -> Ran<Thing> {
