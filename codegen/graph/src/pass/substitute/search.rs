@@ -31,11 +31,43 @@ pub(super) struct EqualitySearch<'g> {
     pub(super) numbers: Vec<usize>,
     /// Whether it is there at no cost: inputs, constants, sines and cosines.
     pub(super) free: Vec<bool>,
+    /// What is free of `numbers`.
+    free_numbers: Vec<usize>,
     /// Per value, the quotients, roots and signs that it depends on; so many words each.
     pub(super) quotients: Vec<u64>,
     pub(super) words: usize,
     pub(super) known: Filter,
     pub(super) singles: FxHashMap<u64, Vec<u32>>,
+}
+
+/// Which values need v: found as far as somebody asks, as most who ask stand near v.
+struct Later<'g> {
+    graph: &'g Graph,
+    v: usize,
+    /// Of v and what stands behind it, up to where it is known.
+    known: Vec<bool>,
+}
+
+impl<'g> Later<'g> {
+    fn new(graph: &'g Graph) -> Self {
+        Later { graph, v: 0, known: Vec::new() }
+    }
+
+    fn begin(&mut self, v: usize) {
+        self.v = v;
+        self.known.clear();
+        self.known.push(true);
+    }
+
+    fn needs(&mut self, x: usize) -> bool {
+        let Some(behind) = x.checked_sub(self.v) else { return false };
+        while self.known.len() <= behind {
+            let operands = self.graph.ops[self.v + self.known.len()].operands();
+            let needs = operands.filter_map(|a| a.index().checked_sub(self.v)).any(|a| self.known[a]);
+            self.known.push(needs);
+        }
+        self.known[behind]
+    }
 }
 
 impl<'g> EqualitySearch<'g> {
@@ -57,6 +89,7 @@ impl<'g> EqualitySearch<'g> {
         let numbers: Vec<usize> = (0..n).filter(is_number).collect();
         let is_free = |op: &Op| matches!(op, Op::Input(_) | Op::Constant(_) | Op::Sin(_) | Op::Cos(_));
         let free: Vec<bool> = graph.ops.iter().map(is_free).collect();
+        let free_numbers = numbers.iter().copied().filter(|i| free[*i]).collect();
         let may_be_no_number = |i: &usize| graph.ops[*i].row().is_some_and(|row| row.kind != OpKind::Polynomial);
         let atoms: Vec<usize> = (0..n).filter(may_be_no_number).collect();
         let words = atoms.len().div_ceil(64);
@@ -75,7 +108,7 @@ impl<'g> EqualitySearch<'g> {
         }
         let mut known = Filter::new(64 * singles.len());
         singles.keys().for_each(|key| known.insert(*key));
-        EqualitySearch { graph, values, zero, uses, numbers, free, quotients, words, known, singles }
+        EqualitySearch { graph, values, zero, uses, numbers, free, free_numbers, quotients, words, known, singles }
     }
 
     /// What v − x, v + x or v / x is at the first point, to be found.
@@ -88,34 +121,34 @@ impl<'g> EqualitySearch<'g> {
         }
     }
 
-    /// Which values need v.
-    fn later(&self, v: usize, later: &mut [bool]) {
-        later[..v].fill(false);
-        later[v] = true;
-        for i in v + 1..later.len() {
-            later[i] = self.graph.ops[i].operands().any(|a| later[a.index()]);
-        }
-    }
-
-    /// What v may be formed of.
-    fn near<'s>(&'s self, v: usize, later: &'s [bool]) -> impl Iterator<Item = usize> + 's {
-        let near = move |x: &usize| (self.free[*x] || x.abs_diff(v) <= WINDOW) && self.may_form(*x, v, later);
-        self.numbers.iter().copied().filter(near)
+    /// What v may be formed of, in the order of the graph.
+    fn near(&self, later: &mut Later<'g>) -> Vec<usize> {
+        let v = later.v;
+        let place = |list: &[usize], end: usize| list.partition_point(|x| *x < end);
+        let (from, to) = (v.saturating_sub(WINDOW), v + WINDOW + 1);
+        let window = &self.numbers[place(&self.numbers, from)..place(&self.numbers, to)];
+        let (before, behind) = (
+            &self.free_numbers[..place(&self.free_numbers, from)],
+            &self.free_numbers[place(&self.free_numbers, to)..],
+        );
+        let near = before.iter().chain(window).chain(behind).copied();
+        near.filter(|x| self.may_form(*x, later)).collect()
     }
 
     /// Whether a value can be part of v: it does not need v itself, nor a quotient that may be infinite where v is not.
-    fn may_form(&self, x: usize, v: usize, later: &[bool]) -> bool {
-        !later[x]
+    fn may_form(&self, x: usize, later: &mut Later<'g>) -> bool {
+        let v = later.v;
+        !later.needs(x)
             && (0..self.words).all(|w| self.quotients[x * self.words + w] & !self.quotients[v * self.words + w] == 0)
     }
 
     /// The pairs that some value is formed of, and maybe others.
     fn pairs(&self, candidates: &[usize]) -> PairTable {
-        let mut later = vec![false; self.graph.ops.len()];
+        let mut later = Later::new(self.graph);
         let mut wanted = Filter::new(6 * WINDOW * candidates.len());
         for &v in candidates {
-            self.later(v, &mut later);
-            for x in self.near(v, &later) {
+            later.begin(v);
+            for x in self.near(&mut later) {
                 for way in WAYS {
                     keys(self.rest(v, x, way)).for_each(|key| wanted.insert(key));
                 }
@@ -128,7 +161,7 @@ impl<'g> EqualitySearch<'g> {
     pub(super) fn moves(&self) -> Vec<GraphChange> {
         let mut moves = Vec::new();
         let mut by_pair: BTreeMap<NewPair, BTreeMap<usize, (usize, Becomes)>> = BTreeMap::new();
-        let mut later = vec![false; self.graph.ops.len()];
+        let mut later = Later::new(self.graph);
         let sums: Vec<usize> = self.numbers.iter().copied().filter(|v| self.is_formed(*v)).collect();
         let candidates: Vec<usize> = sums.iter().copied().filter(|v| self.freed(*v, &[]) > 1).collect();
         let pairs = self.pairs(&candidates);
@@ -142,14 +175,14 @@ impl<'g> EqualitySearch<'g> {
             if equal.is_empty() && candidates.binary_search(&v).is_err() {
                 continue;
             }
-            self.later(v, &mut later);
-            for (u, negative) in equal.into_iter().filter(|(u, _)| self.may_form(*u, v, &later)) {
+            later.begin(v);
+            for (u, negative) in equal.into_iter().filter(|(u, _)| self.may_form(*u, &mut later)) {
                 add(self.freed(v, &[u]), Becomes { value: v, x: u, y: None, negative });
             }
             if candidates.binary_search(&v).is_err() {
                 continue;
             }
-            for x in self.near(v, &later) {
+            for x in self.near(&mut later) {
                 let own = &self.values[x];
                 if !matches!(self.graph.ops[x], Op::Constant(_)) {
                     if let Some((form, c, negative)) = constant(target, own) {
@@ -165,7 +198,7 @@ impl<'g> EqualitySearch<'g> {
                         continue;
                     }
                     let rest = self.rest(v, x, way);
-                    for y in self.found(rest).filter(|y| self.may_form(*y, v, &later)) {
+                    for y in self.found(rest).filter(|y| self.may_form(*y, &mut later)) {
                         let Some((form, negative)) = self.form(v, way, own, &self.values[y]) else { continue };
                         let gain = self.freed(v, &[x, y]) - 1;
                         if gain > 0 {
@@ -173,7 +206,7 @@ impl<'g> EqualitySearch<'g> {
                         }
                     }
                     for pair @ (y, z, _) in pairs.find(rest) {
-                        if !(self.may_form(y, v, &later) && self.may_form(z, v, &later)) {
+                        if !(self.may_form(y, &mut later) && self.may_form(z, &mut later)) {
                             continue;
                         }
                         let Some((form, negative)) = self.form_of_pair(v, way, own, pair) else { continue };
