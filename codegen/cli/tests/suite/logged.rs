@@ -7,6 +7,7 @@ use std::process::{Command, Output};
 use straightline_cli::log_states::{log_demand, named_rates, position_names, with_whole_states};
 use straightline_core::algorithms::inverse_dynamics;
 use straightline_core::model::{Joint, Model};
+use straightline_core::random::Random;
 use straightline_logs::align::{align, AlignedLog};
 use straightline_logs::log::from_columns;
 
@@ -159,13 +160,9 @@ pub struct Normal(pub u64);
 
 impl Normal {
     pub fn next(&mut self) -> f64 {
-        let mut sum = -6.0;
-        for _ in 0..12 {
-            self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
-            let z = (self.0 ^ (self.0 >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-            let z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-            sum += ((z ^ (z >> 31)) >> 11) as f64 / (1u64 << 53) as f64;
-        }
-        sum
+        let mut random = Random(self.0);
+        let normal = (0..12).fold(-6.0, |sum, _| sum + random.unit());
+        self.0 = random.0;
+        normal
     }
 }
