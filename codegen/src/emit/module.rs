@@ -234,6 +234,8 @@ pub enum Index {
     Number(usize),
     /// That of the loop with this index.
     Loop(String),
+    /// As far apart as this, by the turns of a loop.
+    Strided(Stride),
     /// In the row of the loop with this index, of rows of so many numbers, this one.
     Row {
         /// The loop's index.

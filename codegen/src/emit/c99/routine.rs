@@ -49,6 +49,7 @@ impl Target for C99<'_> {
             Expression::Slot(k) => format!("live[{k}]"),
             Expression::Element(array, Index::Number(k)) => format!("{array}[{k}]"),
             Expression::Element(array, Index::Loop(index)) => format!("{array}[{index}]"),
+            Expression::Element(array, Index::Strided(at)) => strided(array, at),
             Expression::Element(array, Index::Row { index, length, entry }) => {
                 strided(array, &Stride { first: *entry, step: *length, index: index.clone() })
             }

@@ -15,6 +15,7 @@
 //! arrays stand at the beginning, and each number goes there as soon as it is computed.
 
 use super::body::{Left, Plan, Statements};
+use super::copies::{copies, Copy};
 use super::rolled::{is_short, Table};
 use super::Lowering;
 use crate::emit::module::{Expression, Index, Statement};
@@ -145,8 +146,11 @@ impl Statements<'_> {
         inner.run(&part.nodes, &plan_of_loop, lowering, &mut body);
         self.names = std::mem::take(&mut inner.names);
         let is_hidden = alike.is_rolled && is_short(alike);
-        out.push(Statement::Limbs { index: turns.index, count, is_hidden, body });
+        out.push(Statement::Limbs { index: turns.index.clone(), count, is_hidden, body });
 
+        // of the columns of a matrix, loops copy what is put out
+        let by_loops = matches!(alike.lanes, LoopLanes::Columns(_)) && !self.scope.style.one_by_one;
+        let mut put_out = Vec::new();
         for ((_, row), name) in results.iter().zip(names).filter_map(|(result, name)| Some((result, name?))) {
             for (limb, id) in row.iter().enumerate() {
                 self.values[id.index()] = Some(Expression::Element(name.clone(), Index::Number(limb)));
@@ -157,11 +161,15 @@ impl Statements<'_> {
                 }
                 let first = plan.results_of.partition_point(|(r, _)| r < id);
                 for (_, k) in plan.results_of[first..].iter().take_while(|(r, _)| r == id) {
-                    self.store_result(*id, *k);
+                    match by_loops {
+                        true => put_out.push(Copy { array: name.clone(), column: limb, result: *k }),
+                        false => self.store_result(*id, *k),
+                    }
                 }
             }
         }
         out.append(&mut self.statements);
+        out.extend(copies(&self.graph.outputs, put_out, &turns.index));
     }
 
     /// What stands in a loop for what limbs take from outside; arrays of it, and the table of constants, come before the loop.

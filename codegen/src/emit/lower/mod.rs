@@ -4,6 +4,7 @@
 //! algorithm gave them; every section of the algorithm is a block under a comment.
 
 mod body;
+mod copies;
 pub mod fused;
 mod limbs;
 mod names;

@@ -39,6 +39,7 @@ impl Target for Rust {
             Expression::Slot(k) => format!("live[{k}]{}", lane(style)),
             Expression::Element(array, Index::Number(k)) => format!("{array}[{k}]"),
             Expression::Element(array, Index::Loop(index)) => format!("{array}[{index}]"),
+            Expression::Element(array, Index::Strided(at)) => format!("{array}[{}]", turned(at)),
             Expression::Element(array, Index::Row { index, entry, .. }) => format!("{array}[{index}][{entry}]"),
             Expression::Fused { factors: [a, b], is_negated, term, is_subtracted } => {
                 let signed = |e: &Expression, minus: bool| match minus {
@@ -299,12 +300,30 @@ fn place(port: &Port, k: usize, style: Style) -> String {
     }
 }
 
-/// The place of a number of a port in a loop over limbs, which counts through an array of one extent.
-fn strided(port: &Port, Stride { first, step, index }: &Stride) -> String {
+/// The place of a number of a port in a loop, which counts through one of its axes.
+fn strided(port: &Port, at: &Stride) -> String {
+    let (mut rest, mut inner) = (at.first, port.len());
+    let mut text = port.name.clone();
+    let mut step = at.step;
+    for n in &port.shape {
+        inner /= n;
+        let (first, of_axis) = (rest / inner, step / inner);
+        rest %= inner;
+        step %= inner;
+        let _ = match of_axis {
+            0 => write!(text, "[{first}]"),
+            step => write!(text, "[{}]", turned(&Stride { first, step, index: at.index.clone() })),
+        };
+    }
+    text
+}
+
+/// `limb`, `3 * limb`, `7 + limb`, `7 + 3 * limb`
+fn turned(Stride { first, step, index }: &Stride) -> String {
     let turns = if *step == 1 { index.clone() } else { format!("{step} * {index}") };
     match first {
-        0 => format!("{}[{turns}]", port.name),
-        first => format!("{}[{first} + {turns}]", port.name),
+        0 => turns,
+        first => format!("{first} + {turns}"),
     }
 }
 
