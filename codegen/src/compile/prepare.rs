@@ -63,6 +63,13 @@ pub(super) fn prepare(source: &Source, options: &Options) -> Result<Prepared, Di
         let complaint = scene::messages::function_not_of_robot(function.name(), function.lacking(model));
         options.scene.places.complain(&path_of(function), complaint, &mut diagnostics);
     }
+    for (function, model) in options.scene.contacts.named().filter_map(|f| Some((f, of_frames?))) {
+        let (base, path) = (function.spec().base, format!("outputs.contact.{}", function.name()));
+        if !base.is_of(model) {
+            let complaint = scene::messages::function_not_of_robot(function.name(), base.lacking(model));
+            options.scene.places.complain(&path, complaint, &mut diagnostics);
+        }
+    }
     let loads = of_frames.is_some_and(|m| options.scene.parameters.iter().any(|p| p.is_load() && p.is_of(m)));
     for function in functions.iter().filter(|function| function.is_of_scene_parameters() && !loads) {
         let complaint = scene::messages::function_not_of_scene(function.name());

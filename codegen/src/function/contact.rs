@@ -95,6 +95,8 @@ use ContactExtent::{Constrained, Free, Masses, Robot};
 use PerContact::{WithMass, WithOwnCoordinate};
 
 const VELOCITIES: ContactExtent = Robot(Extent::Velocities);
+const STATES: ContactExtent = Robot(Extent::DriveStates);
+const INPUTS: ContactExtent = Robot(Extent::Drives);
 const ONE: &[ContactExtent] = &[Robot(Extent::Of(1))];
 const TWO: &[ContactExtent] = &[Robot(Extent::Of(2))];
 const TWO_ROWS: &[ContactExtent] = &[Robot(Extent::Of(2)), VELOCITIES];
@@ -126,6 +128,26 @@ const IMPULSE: ContactPort = ContactPort::new("impulse", &[Constrained], "impuls
 const COORDINATES: [ContactPort; 2] = [
     ContactPort::new("s", &[Constrained], "coordinates \\[m, or cosine\\]"),
     ContactPort::new("sd", &[Constrained], "their rates \\[m/s or 1/s\\]"),
+];
+const XD: ContactPort = ContactPort::new("xd", &[STATES], "derivative of the drives' state, in the order of x");
+const DQDD_DOWN: ContactPort = ContactPort::new(
+    "dqdd_d{}_own",
+    &[VELOCITIES, Robot(Extent::Of(2))],
+    "rows of ∂q̈ by the object's own coordinate and its rate",
+)
+.per(WithOwnCoordinate);
+const DFORCE_DOWN: ContactPort =
+    ContactPort::new("dforce_d{}_own", &[Constrained, Robot(Extent::Of(2))], "rows of ∂F by them \\[N/m, N·s/m\\]")
+        .per(WithOwnCoordinate);
+const DOWN_RATE: [ContactPort; 3] = [
+    ContactPort::new("d{}_own_rate_dq", TWO_ROWS, "rows of the derivatives of their rates by q").per(WithOwnCoordinate),
+    ContactPort::new("d{}_own_rate_dqd", TWO_ROWS, "the same by q̇").per(WithOwnCoordinate),
+    ContactPort::new(
+        "d{}_own_rate_down",
+        &[Robot(Extent::Of(2)), Robot(Extent::Of(2))],
+        "the same by the coordinate and its rate themselves",
+    )
+    .per(WithOwnCoordinate),
 ];
 const ADJOINT: &str = "adjoint vector A \\[m/s² or 1/s²\\]";
 const JACOBIAN: &str = "Jacobian, a row per coordinate";
@@ -213,7 +235,7 @@ contact_functions! {
         inputs: &[OWN],
         outputs: &[
             QDD,
-            ContactPort::new("xd", &[Robot(Extent::DriveStates)], "derivative of the drives' state, in the order of x"),
+            XD,
             FORCE,
             SDD,
             VIOLATION,
@@ -291,30 +313,59 @@ in its own axes",
             ContactPort::new("dforce_dtau", ROWS, "rows of ∂F/∂τ \\[1/m, 1\\]"),
             PIVOT,
             OWN_RATE,
-            ContactPort::new(
-                "dqdd_d{}_own",
-                &[VELOCITIES, Robot(Extent::Of(2))],
-                "rows of ∂q̈ by the object's own coordinate and its rate",
-            )
-            .per(WithOwnCoordinate),
-            ContactPort::new(
-                "dforce_d{}_own",
-                &[Constrained, Robot(Extent::Of(2))],
-                "rows of ∂F by them \\[N/m, N·s/m\\]",
-            )
-            .per(WithOwnCoordinate),
-            ContactPort::new("d{}_own_rate_dq", TWO_ROWS, "rows of the derivatives of their rates by q").per(WithOwnCoordinate),
-            ContactPort::new("d{}_own_rate_dqd", TWO_ROWS, "the same by q̇").per(WithOwnCoordinate),
-            ContactPort::new(
-                "d{}_own_rate_down",
-                &[Robot(Extent::Of(2)), Robot(Extent::Of(2))],
-                "the same by the coordinate and its rate themselves",
-            )
-            .per(WithOwnCoordinate),
+            DQDD_DOWN,
+            DFORCE_DOWN,
+            DOWN_RATE[0],
+            DOWN_RATE[1],
+            DOWN_RATE[2],
         ],
         is_by_name: true,
         form: Function::ForwardDynamicsDerivatives,
         divisor: Divisor::Inertia,
+        ..DEFAULT
+    },
+    /// Accelerations and reactions under the inputs of the drives, of a robot that has drives, with their derivatives.
+    #[doc(alias("contact dynamics derivatives", "linearisation by voltages"))]
+    DrivenForwardDynamicsDerivatives: ContactSpec {
+        name: "driven_forward_dynamics_derivatives",
+        summary: "Motion and reactions in contact under the inputs of the drives, and the rates of the drives' states, with their derivatives by \
+                  q, q̇, x, u and the objects' own coordinates.",
+        base: Function::DrivenForwardDynamics,
+        inputs: &[OWN],
+        outputs: &[
+            QDD,
+            XD,
+            FORCE,
+            ContactPort::new(
+                "dqdd_dq",
+                SQUARE,
+                "rows of ∂q̈/∂q at constant x and u \\[1/s²; with sliding joints also 1/(m·s²), m/s²\\]; of a floating base by increments of its \
+pose in its own axes",
+            ),
+            ContactPort::new("dqdd_dqd", SQUARE, "rows of ∂q̈/∂q̇ \\[1/s; with sliding joints also 1/(m·s), m/s\\]"),
+            ContactPort::new("dqdd_dx", &[VELOCITIES, STATES], "rows of ∂q̈/∂x, one column per state"),
+            ContactPort::new("dqdd_du", &[VELOCITIES, INPUTS], "rows of ∂q̈/∂u \\[rad/(s²·V), or as in the robot file\\]"),
+            ContactPort::new("dxd_dq", &[STATES, VELOCITIES], "rows of ∂ẋ/∂q"),
+            ContactPort::new("dxd_dqd", &[STATES, VELOCITIES], "rows of ∂ẋ/∂q̇"),
+            ContactPort::new("dxd_dx", &[STATES, STATES], "rows of ∂ẋ/∂x"),
+            ContactPort::new("dxd_du", &[STATES, INPUTS], "rows of ∂ẋ/∂u"),
+            ContactPort::new("dforce_dq", ROWS, "rows of ∂F/∂q, as those of ∂q̈/∂q \\[N/rad, N/m\\]"),
+            ContactPort::new("dforce_dqd", ROWS, "rows of ∂F/∂q̇ \\[N·s/rad, N·s/m\\]"),
+            ContactPort::new("dforce_dx", &[Constrained, STATES], "rows of ∂F/∂x"),
+            ContactPort::new("dforce_du", &[Constrained, INPUTS], "rows of ∂F/∂u \\[N/V, or as in the robot file\\]"),
+            PIVOT,
+            OWN_RATE,
+            DQDD_DOWN,
+            ContactPort::new("dxd_d{}_own", &[STATES, Robot(Extent::Of(2))], "rows of ∂ẋ by them").per(WithOwnCoordinate),
+            DFORCE_DOWN,
+            DOWN_RATE[0],
+            DOWN_RATE[1],
+            DOWN_RATE[2],
+        ],
+        modes: InModes::OfDrivenRobots,
+        is_by_name: true,
+        form: Function::ForwardDynamicsDerivatives,
+        divisor: Divisor::InertiaWithDrives,
         ..DEFAULT
     },
     /// Velocities after an impact and impulses with their derivatives.

@@ -353,6 +353,11 @@ impl SceneContacts {
         self.contacts.iter().map(alone).collect()
     }
 
+    /// The functions that somebody named.
+    pub fn named(&self) -> impl Iterator<Item = ContactFunction> + '_ {
+        self.functions.iter().flatten().copied()
+    }
+
     /// The functions that are wanted, in order.
     pub fn wanted(&self) -> Vec<ContactFunction> {
         let is_wanted = |f: &ContactFunction| match &self.functions {

@@ -29,12 +29,12 @@ use straightline_core::reference::{
 use straightline_core::spatial::Vec3;
 use straightline_core::{Dd, Dual, Real};
 
-type Moving = Dual<Dd, 1>;
-type State<T> = BTreeMap<String, Vec<T>>;
+pub type Moving = Dual<Dd, 1>;
+pub type State<T> = BTreeMap<String, Vec<T>>;
 
 /// Errors of the greatest entry of a block, in double-double and in f64, where p is the least pivot: reactions keep (ε/p)² of their ridge ε, and lose the
 /// digits that p costs.
-fn allowed(pivot: f64) -> [f64; 2] {
+pub fn allowed(pivot: f64) -> [f64; 2] {
     [1e-22 + 1e4 * (1e-12 / pivot) * (1e-12 / pivot), 1e-13 / pivot]
 }
 
@@ -44,14 +44,14 @@ fn source(file: &str) -> Source {
 }
 
 /// A robot in a scene.
-struct Case {
-    robot: Robot,
+pub struct Case {
+    pub robot: Robot,
     tree: CentreOfMassTree<Dd>,
-    options: Options,
+    pub options: Options,
 }
 
 impl Case {
-    fn new(file: &str, floating_base: bool, scene: &str) -> Case {
+    pub fn new(file: &str, floating_base: bool, scene: &str) -> Case {
         let source = source(file);
         let mut diagnostics = Diagnostics::new();
         let read = scene_file::read(&Source::new("scene.toml", scene), &mut diagnostics);
@@ -67,22 +67,22 @@ impl Case {
         Case { robot, tree, options }
     }
 
-    fn nv(&self) -> usize {
+    pub fn nv(&self) -> usize {
         self.robot.model.nv()
     }
 
-    fn modes(&self) -> Vec<Mode<'_>> {
+    pub fn modes(&self) -> Vec<Mode<'_>> {
         Mode::all(&self.options.scene)
     }
 
     /// q + k-th increment of its tangent, to first order.
-    fn increment(&self, q: &[Dd], k: usize) -> Vec<Dd> {
+    pub fn increment(&self, q: &[Dd], k: usize) -> Vec<Dd> {
         let unit: Vec<Dd> = (0..self.nv()).map(|i| if i == k { Dd::ONE } else { Dd::ZERO }).collect();
         self.robot.model.configuration_rate(q, &unit)
     }
 
     /// Inputs of a mode's functions.
-    fn state(&self, mode: &Mode, random: &mut Random) -> State<Dd> {
+    pub fn state(&self, mode: &Mode, random: &mut Random) -> State<Dd> {
         let mut state = State::new();
         let mut add = |name: &str, x: Vec<f64>| state.insert(name.to_string(), x.into_iter().map(Dd::from).collect());
         let (nv, nq) = (self.nv(), self.robot.model.nq());
@@ -109,12 +109,12 @@ impl Case {
     }
 }
 
-fn list(random: &mut Random, n: usize, bound: f64) -> Vec<f64> {
+pub fn list(random: &mut Random, n: usize, bound: f64) -> Vec<f64> {
     (0..n).map(|_| random.symmetric(bound)).collect()
 }
 
 /// The results of a program by name; inputs by name.
-fn run<T: Real>(graph: &Graph, state: &State<T>) -> State<T> {
+pub fn run<T: Real>(graph: &Graph, state: &State<T>) -> State<T> {
     let given: Vec<T> = graph.inputs.iter().flat_map(|port| state[&port.name].clone()).collect();
     let mut results = evaluate::<T>(graph, &given).into_iter();
     graph.outputs.iter().map(|port: &Port| (port.name.clone(), results.by_ref().take(port.len()).collect())).collect()
@@ -423,7 +423,7 @@ fn expected(truth: &Truth) -> State<Dd> {
     all
 }
 
-fn greatest<'a>(list: impl IntoIterator<Item = &'a Dd>) -> f64 {
+pub fn greatest<'a>(list: impl IntoIterator<Item = &'a Dd>) -> f64 {
     list.into_iter().fold(0.0, |most: f64, x| most.max(x.abs().hi()))
 }
 
@@ -484,9 +484,9 @@ fn hold(case: &Case, function: ContactFunction, states: usize) {
     assert!(failures.is_empty(), "{} are off:\n{}", failures.len(), failures[..failures.len().min(40)].join("\n"));
 }
 
-const OBJECT: &str = "object = { origin = [0.5, 0.1, 0.2], z = [0.1, 0.2, 1.0] }";
+pub const OBJECT: &str = "object = { origin = [0.5, 0.1, 0.2], z = [0.1, 0.2, 1.0] }";
 
-fn contact(name: &str, frame: &str, more: &str) -> String {
+pub fn contact(name: &str, frame: &str, more: &str) -> String {
     format!("[[contact]]\nname = \"{name}\"\nframe = \"{frame}\"\n{more}\n")
 }
 

@@ -25,6 +25,7 @@ mod convert_sdf;
 mod dampers;
 mod derivative_bounds;
 mod dh;
+mod driven_contact_derivatives;
 mod dyads;
 mod effects;
 mod elastic_inverse;

@@ -14,24 +14,24 @@ use straightline_core::contact::{Contact, Object, Surface};
 use straightline_core::{algorithms as alg, Dual, Real};
 
 /// What a motion is asked about: x, which is q̈ or Δq̇, and F, which may be impulses.
-struct FoundMotion<'a, T> {
-    x: &'a [T],
-    force: &'a [T],
+pub(super) struct FoundMotion<'a, T> {
+    pub x: &'a [T],
+    pub force: &'a [T],
     /// Whether x is q̈: then s̈ = J x + A counts, of an impact J x alone.
-    is_motion: bool,
+    pub is_motion: bool,
 }
 
 /// How the contacts of a mode change.
-struct MovedContacts<'a, T> {
-    footings: Vec<Footing<'a, Dual<T, 1>>>,
+pub(super) struct MovedContacts<'a, T> {
+    pub footings: Vec<Footing<'a, Dual<T, 1>>>,
     /// Of s̈, or of J Δq̇.
-    along: Vec<T>,
+    pub along: Vec<T>,
     /// Of Ĵᵀ F.
-    pushed: Vec<T>,
+    pub pushed: Vec<T>,
 }
 
 impl<T: Real> MovedContacts<'_, T> {
-    fn constrained(&self) -> FunctionalCoordinates<Dual<T, 1>> {
+    pub fn constrained(&self) -> FunctionalCoordinates<Dual<T, 1>> {
         together(&self.footings.iter().collect::<Vec<_>>())
     }
 }
@@ -52,11 +52,11 @@ fn slope<T: Real>(x: &Dual<T, 1>) -> T {
     x.derivatives[0]
 }
 
-fn slopes<T: Real>(list: &[Dual<T, 1>]) -> Vec<T> {
+pub(super) fn slopes<T: Real>(list: &[Dual<T, 1>]) -> Vec<T> {
     list.iter().map(slope).collect()
 }
 
-fn fixed<T: Real>(list: &[T]) -> Vec<Dual<T, 1>> {
+pub(super) fn fixed<T: Real>(list: &[T]) -> Vec<Dual<T, 1>> {
     list.iter().map(|x| Dual::fixed(*x)).collect()
 }
 
@@ -65,11 +65,11 @@ fn dot<T: Real>(a: &[T], b: &[T]) -> T {
 }
 
 impl<T: Real> CommonEquations<'_, T> {
-    fn nv(&self) -> usize {
+    pub fn nv(&self) -> usize {
         self.bound.model.nv()
     }
 
-    fn held_inputs(&self) -> Added<Dual<T, 1>> {
+    pub fn held_inputs(&self) -> Added<Dual<T, 1>> {
         self.added.iter().map(|(name, x)| (name.clone(), fixed(x))).collect()
     }
 
@@ -184,7 +184,7 @@ impl<T: Real> CommonEquations<'_, T> {
     }
 
     /// Contacts where each coordinate moves, where each rate does, and where nothing does.
-    fn all_moved(&self, found: &FoundMotion<T>) -> ([Vec<MovedContacts<'_, T>>; 2], MovedContacts<'_, T>) {
+    pub fn all_moved(&self, found: &FoundMotion<T>) -> ([Vec<MovedContacts<'_, T>>; 2], MovedContacts<'_, T>) {
         let swept = self.form.own.reduced.then(|| self.swept(found));
         let of = |moving: Option<Moving>| match &swept {
             Some(swept) => self.moved(swept, moving),
@@ -198,8 +198,7 @@ impl<T: Real> CommonEquations<'_, T> {
     /// q̈, F, and their derivatives by q, q̇, τ and the objects' own coordinates.
     pub fn forward_dynamics_derivatives(&self) -> Vec<Vec<T>> {
         let (nv, constrained) = (self.nv(), &self.constrained);
-        let bias = self.of_robot(Function::BiasForce, &[self.q().clone(), self.qd().clone()]);
-        let drive: Vec<T> = self.bound.arguments[2].iter().zip(bias).map(|(tau, h)| *tau - h).collect();
+        let drive: Vec<T> = self.bound.arguments[2].iter().zip(self.bias_force()).map(|(tau, h)| *tau - h).collect();
         let (factor, applied) = (self.factor(), self.applied());
         let (stands, own_rates) = supports(&self.footings(), constrained, self.options, self.added);
         let factors =
@@ -246,18 +245,27 @@ impl<T: Real> CommonEquations<'_, T> {
         (change, rates.iter().map(|x| slopes(x)).collect())
     }
 
+    /// The inputs where each object's own coordinate moves, and where its rate does.
+    pub fn inputs_of_own_coordinates(&self, inputs: &Added<Dual<T, 1>>) -> Vec<[Added<Dual<T, 1>>; 2]> {
+        let named = self.mode.contacts.iter().map(|c| format!("{}_own", c.item.identifier()));
+        let moving = |name: String| {
+            [0, 1].map(|k| {
+                let mut moving = inputs.clone();
+                let own = moving.get_mut(&name).expect("it is an input");
+                own[k] = Dual::variable(own[k].value, 0);
+                moving
+            })
+        };
+        named.filter(|name| inputs.contains_key(name)).map(moving).collect()
+    }
+
     /// By each object's own coordinate and its rate: q̈, F, and their own rates, a block of two columns per contact that has them.
     fn by_own_coordinates(&self, factors: &ContactFactors<'_, T>, at_rest: &MovedContacts<'_, T>) -> [Vec<Vec<T>>; 3] {
         let inputs = self.held_inputs();
         let mut blocks: [Vec<Vec<T>>; 3] = Default::default();
-        let named = self.mode.contacts.iter().map(|c| format!("{}_own", c.item.identifier()));
-        for (c, name) in named.filter(|name| inputs.contains_key(name)).enumerate() {
-            let columns = [0, 1].map(|k| {
-                let mut moving = inputs.clone();
-                let own = moving.get_mut(&name).expect("it is an input");
-                own[k] = Dual::variable(own[k].value, 0);
-                self.change(factors, at_rest, &moving, vec![T::zero(); self.nv()])
-            });
+        for (c, moving) in self.inputs_of_own_coordinates(&inputs).iter().enumerate() {
+            let columns =
+                moving.each_ref().map(|moving| self.change(factors, at_rest, moving, vec![T::zero(); self.nv()]));
             blocks[0].push(by_rows(&columns.each_ref().map(|(change, _)| change[0].clone())));
             blocks[1].push(by_rows(&columns.each_ref().map(|(change, _)| change[1].clone())));
             blocks[2].push(by_rows(&columns.each_ref().map(|(_, rates)| rates[c].clone())));

@@ -8,7 +8,8 @@ use crate::options::Options;
 use crate::scene::contact::{tool_axes, SurfaceItem};
 use std::collections::BTreeMap;
 use straightline_core::algorithms::{
-    ContactRows, Environment, FunctionalCoordinates, Ltdl, RelativeMotion, Struck, Support,
+    ConstrainedMotion, ContactRows, DrivenMotion, Environment, FunctionalCoordinates, Ltdl, RelativeMotion, Struck,
+    Support,
 };
 use straightline_core::contact::{Contact, Coordinate, Object, ObjectMotion, Surface};
 use straightline_core::spatial::{Mat3, MotionVector, Transform, Vec3};
@@ -134,12 +135,13 @@ pub(super) fn equations<T: Real>(
     match function {
         ContactFunction::ConstrainedCoordinates => list(given.constrained),
         ContactFunction::FreeCoordinates => list(given.free()),
-        ContactFunction::ForwardDynamics => given.forward_dynamics(false),
-        ContactFunction::DrivenForwardDynamics => given.forward_dynamics(true),
+        ContactFunction::ForwardDynamics => given.forward_dynamics(),
+        ContactFunction::DrivenForwardDynamics => given.driven_forward_dynamics(),
         ContactFunction::InverseDynamics => given.inverse_dynamics(),
         ContactFunction::Impact => given.impact(),
         ContactFunction::Projection => given.projection(),
         ContactFunction::ForwardDynamicsDerivatives => given.forward_dynamics_derivatives(),
+        ContactFunction::DrivenForwardDynamicsDerivatives => given.driven_forward_dynamics_derivatives(),
         ContactFunction::ImpactDerivatives => given.impact_derivatives(),
     }
 }
@@ -161,7 +163,11 @@ impl<T: Real> CommonEquations<'_, T> {
         self.traced.iter().map(|t| &t.footing).collect()
     }
 
-    fn mass_matrix(&self) -> Vec<T> {
+    pub fn bias_force(&self) -> Vec<T> {
+        self.of_robot(Function::BiasForce, &[self.q().clone(), self.qd().clone()])
+    }
+
+    pub fn mass_matrix(&self) -> Vec<T> {
         self.of_robot(Function::MassMatrix, std::slice::from_ref(self.q()))
     }
 
@@ -190,25 +196,34 @@ impl<T: Real> CommonEquations<'_, T> {
         slides.then(|| self.traced.iter().flat_map(of).collect())
     }
 
-    fn forward_dynamics(&self, is_driven: bool) -> Vec<Vec<T>> {
+    fn forward_dynamics(&self) -> Vec<Vec<T>> {
         let CommonEquations { bound, constrained, epsilon, .. } = self;
-        let bias = self.of_robot(Function::BiasForce, &[self.q().clone(), self.qd().clone()]);
+        let bias = self.bias_force();
         let (supports, own_rates) = supports(&self.footings(), constrained, self.options, self.added);
         let applied = self.applied();
-        let applied = applied.as_deref();
-        let (motion, xd) = if is_driven {
-            let at = (&self.q()[..], &self.qd()[..], &bound.arguments[2][..], &bound.arguments[3][..]);
-            let rows = ContactRows { coordinates: constrained, applied, supports: &supports, ridge: *epsilon };
-            let (motion, drives) = alg::driven_contact_motion(&bound.model, at, &bias, &self.mass_matrix(), rows);
-            (motion, vec![drives.xd])
-        } else {
-            let drive: Vec<T> = bound.arguments[2].iter().zip(bias).map(|(tau, h)| *tau - h).collect();
-            let factor = self.factor();
-            let motion = alg::constrained_forward_dynamics(&factor, &drive, constrained, applied, &supports, *epsilon);
-            (motion, vec![])
-        };
-        let results = vec![motion.force, motion.sdd, motion.violation, vec![motion.pivot]];
-        [vec![motion.qdd], xd, results, own_rates].concat()
+        let drive: Vec<T> = bound.arguments[2].iter().zip(bias).map(|(tau, h)| *tau - h).collect();
+        let factor = self.factor();
+        let motion =
+            alg::constrained_forward_dynamics(&factor, &drive, constrained, applied.as_deref(), &supports, *epsilon);
+        [vec![motion.qdd.clone()], of_rows(&motion), own_rates].concat()
+    }
+
+    fn driven_forward_dynamics(&self) -> Vec<Vec<T>> {
+        let (motion, drives, own_rates) = self.driven_motion();
+        [vec![motion.qdd.clone(), drives.xd], of_rows(&motion), own_rates].concat()
+    }
+
+    /// The motion under the inputs of the drives, what goes on in them, and the rates of the objects' own coordinates.
+    pub fn driven_motion(&self) -> (ConstrainedMotion<T>, DrivenMotion<T>, Vec<Vec<T>>) {
+        let CommonEquations { bound, constrained, epsilon, .. } = self;
+        let bias = self.bias_force();
+        let (supports, own_rates) = supports(&self.footings(), constrained, self.options, self.added);
+        let applied = self.applied();
+        let at = (&self.q()[..], &self.qd()[..], &bound.arguments[2][..], &bound.arguments[3][..]);
+        let rows =
+            ContactRows { coordinates: constrained, applied: applied.as_deref(), supports: &supports, ridge: *epsilon };
+        let (motion, drives) = alg::driven_contact_motion(&bound.model, at, &bias, &self.mass_matrix(), rows);
+        (motion, drives, own_rates)
     }
 
     fn inverse_dynamics(&self) -> Vec<Vec<T>> {
@@ -275,6 +290,11 @@ impl<T: Real> CommonEquations<'_, T> {
         };
         vec![correction, self.constrained.value]
     }
+}
+
+/// F, s̈, what s̈ should be less that, and the least pivot.
+fn of_rows<T: Real>(motion: &ConstrainedMotion<T>) -> Vec<Vec<T>> {
+    vec![motion.force.clone(), motion.sdd.clone(), motion.violation.clone(), vec![motion.pivot]]
 }
 
 /// What the rows stand on, and the rates of the objects' own coordinates.

@@ -5,6 +5,7 @@
 //! motion of a contact's frame shares the recursion of the bias force.
 
 mod derivatives;
+mod driven_derivatives;
 mod equations;
 
 use crate::equations::bind::{is_optional, BoundRobot};

@@ -234,7 +234,10 @@ impl SceneReader<'_> {
         let mut wanted = Vec::new();
         for name in self.reader.names_at(table, "contact", "function") {
             match ContactFunction::from_name(&name.value) {
-                Some(function) => wanted.push(function),
+                Some(function) => {
+                    self.file.scene.places.note(format!("outputs.contact.{}", name.value), &name.place);
+                    wanted.push(function);
+                }
                 None => {
                     let known: Vec<&str> = ContactFunction::ALL.iter().map(|f| f.name()).collect();
                     let complaint = say::unknown_contact_function(&name.value, &known);
