@@ -169,8 +169,11 @@ fn compiled_lanes_have_the_bits_of_their_program() {
     let lanes = |floating| Options { functions: vec![function], ..options(floating, ColumnForm::Lanes) };
     let mut in_parts = lanes(true);
     in_parts.limits.operations = 300;
+    let mut by_columns = lanes(false);
+    by_columns.scene.by_columns = true;
     let cases = [
         ("arm", arm(), lanes(false)),
+        ("arm_by_columns", arm(), by_columns),
         ("biped", biped(), in_parts),
         ("hand", hand(), Options { scalar: Scalar::F32, lanes: Some(Lanes::Standalone), ..lanes(false) }),
         ("fused_arm", arm(), Options { fma: true, ..lanes(false) }),
@@ -182,6 +185,14 @@ fn compiled_lanes_have_the_bits_of_their_program() {
         let states: Vec<Vec<f64>> = (0..4).map(|_| (0..inputs).map(|_| 2.0 * n.next()).collect()).collect();
         let text = compile(&source, &options).unwrap_or_else(|errors| panic!("{errors}")).text;
         assert!(text.contains("for column in "), "{name} is written as a loop");
+        // results go to their matrices by loops, too: in C's order along rows, in Fortran's along columns
+        let is_copy = |line: &&str| line.starts_with("dqdd_dq[") && line.contains("column]") && line.contains(" = y");
+        let copies: Vec<&str> = text.lines().map(str::trim).filter(is_copy).collect();
+        assert!(!copies.is_empty(), "{name}");
+        for copy in copies {
+            let outer = copy.split(']').next().expect("a place");
+            assert_eq!(outer.contains("column"), options.scene.by_columns, "{name}: {copy}");
+        }
         let main = caller(&text, function, &states, &program, options.scalar.name());
         assert_bits(&folder, (name, main), &program, &options, &states);
     }

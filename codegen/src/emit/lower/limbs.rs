@@ -15,7 +15,7 @@
 //! arrays stand at the beginning, and each number goes there as soon as it is computed.
 
 use super::body::{Left, Plan, Statements};
-use super::copies::{copies, Copy};
+use super::copies::{copies, CopiedResult};
 use super::rolled::{is_short, Table};
 use super::Lowering;
 use crate::emit::module::{Expression, Index, Statement};
@@ -162,7 +162,7 @@ impl Statements<'_> {
                 let first = plan.results_of.partition_point(|(r, _)| r < id);
                 for (_, k) in plan.results_of[first..].iter().take_while(|(r, _)| r == id) {
                     match by_loops {
-                        true => put_out.push(Copy { array: name.clone(), column: limb, result: *k }),
+                        true => put_out.push(CopiedResult { array: name.clone(), column: limb, result: *k }),
                         false => self.store_result(*id, *k),
                     }
                 }
