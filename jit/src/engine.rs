@@ -3,6 +3,7 @@
 use crate::allocation::{AllocatedProgram, MemoryPlace};
 use crate::between::PlacedCalls;
 use crate::interpreter;
+use crate::lines::LineNumbers;
 use crate::machine::{Format, HostInstructions, SIGNS};
 use crate::native::{NativeCode, NativeInstructions};
 use crate::number::Number;
@@ -182,7 +183,7 @@ struct MachineCode<T> {
     lanes: usize,
     frame_length: usize,
     /// Signs, then each constant in all lanes.
-    constants: Vec<T>,
+    constants: LineNumbers<T>,
     /// Of each phase, the calls before it and whether it has instructions.
     phases: Vec<(PlacedCalls, bool)>,
     results: Vec<MemoryPlace>,
@@ -194,9 +195,9 @@ struct MachineCode<T> {
 impl<T: Number> MachineCode<T> {
     fn new(tape: &ProgramTape<T>, allocated: &AllocatedProgram, format: Format, pages: Pages) -> io::Result<Self> {
         let lanes = format.lanes();
-        let constants: Vec<T> = std::iter::repeat_n(T::minus_zero(), SIGNS * lanes)
-            .chain(tape.constants.iter().flat_map(|c| std::iter::repeat_n(*c, lanes)))
-            .collect();
+        let constants = std::iter::repeat_n(T::minus_zero(), SIGNS * lanes)
+            .chain(tape.constants.iter().flat_map(|c| std::iter::repeat_n(*c, lanes)));
+        let constants = LineNumbers::new(constants, (SIGNS + tape.constants.len()) * lanes);
         let function = format.set.row().function;
         let functions: Vec<Vec<u8>> = allocated.phases.iter().map(|phase| function(phase, format)).collect();
         let frame_length = allocated.cells * lanes;

@@ -2,6 +2,7 @@
 
 use crate::batch::BatchLayout;
 use crate::engine::{Executable, ExecutionMode};
+use crate::lines::LineNumbers;
 use crate::native::{NativeInstructions, NativeJob};
 use crate::number::Number;
 use crate::tape::ProgramTape;
@@ -459,8 +460,9 @@ impl<T: Number, const N: usize> NativeJob for Blocks<'_, '_, '_, T, N> {
         let [taken, outputs] = [taken, outputs].map(|ports| ports.iter().map(Port::len).collect::<Vec<usize>>());
         let entries: usize = outputs.iter().sum();
         // `N` entries more are written and read along with those of a block
-        let mut frame = vec![T::default(); executable.frame_length(true) + N * N];
-        let mut found = vec![[T::default(); N]; entries + N];
+        let mut frame = LineNumbers::<T>::zeros(executable.frame_length(true) + N * N);
+        let mut found = LineNumbers::<T>::zeros((entries + N) * N);
+        let found = found.as_chunks_mut::<N>().0;
         for first in (0..states).step_by(N) {
             // inputs stand first in a frame, one behind the other; what is behind them is written before it is read
             let mut rest = frame.as_chunks_mut::<N>().0;

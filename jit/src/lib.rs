@@ -35,6 +35,7 @@ mod between;
 mod engine;
 mod function;
 pub mod interpreter;
+mod lines;
 pub mod machine;
 #[allow(unsafe_code)]
 mod native;
@@ -60,4 +61,5 @@ struct GuideRunTime;
 #[doc(hidden)]
 pub mod internals {
     pub use crate::engine::tests as engine;
+    pub use crate::lines::tests as lines;
 }

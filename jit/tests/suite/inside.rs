@@ -1,4 +1,4 @@
-//! What a module tests of itself. The test stands in the module, as a function (`mod tests`, feature `internals`): a unit test would be a second
+//! What modules test of themselves. Tests stand in the modules, as functions (`mod tests`, feature `internals`): a unit test would be a second
 //! build of the package.
 
 use straightline_jit::internals;
@@ -6,4 +6,9 @@ use straightline_jit::internals;
 #[test]
 fn without_executable_pages_it_is_interpreted() {
     internals::engine::without_executable_pages_it_is_interpreted();
+}
+
+#[test]
+fn numbers_begin_a_line() {
+    internals::lines::numbers_begin_a_line();
 }
