@@ -147,7 +147,18 @@ impl Statements<'_> {
         self.names = std::mem::take(&mut inner.names);
         let is_hidden = alike.is_rolled && is_short(alike);
         out.push(Statement::Limbs { index: turns.index.clone(), count, is_hidden, body });
+        self.hand_out(&results, names, plan, (alike, &turns.index), out);
+    }
 
+    /// What a loop left in arrays goes to where it is taken from.
+    fn hand_out(
+        &mut self,
+        results: &[(NodeId, Vec<NodeId>)],
+        names: Vec<Option<String>>,
+        plan: &Plan<'_>,
+        (alike, index): (&Alike, &str),
+        out: &mut Vec<Statement>,
+    ) {
         // of the columns of a matrix, loops copy what is put out
         let by_loops = matches!(alike.lanes, LoopLanes::Columns(_)) && !self.scope.style.one_by_one;
         let mut put_out = Vec::new();
@@ -169,7 +180,7 @@ impl Statements<'_> {
             }
         }
         out.append(&mut self.statements);
-        out.extend(copies(&self.graph.outputs, put_out, &turns.index));
+        out.extend(copies(&self.graph.outputs, put_out, index));
     }
 
     /// What stands in a loop for what limbs take from outside; arrays of it, and the table of constants, come before the loop.
