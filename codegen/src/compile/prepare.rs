@@ -59,14 +59,13 @@ pub(super) fn prepare(source: &Source, options: &Options) -> Result<Prepared, Di
         true => format!("outputs.{}", function.name()),
         false => "options.functions".to_string(),
     };
-    for (function, model) in functions.iter().filter_map(|f| Some((f, of_frames?))).filter(|(f, m)| !f.is_of(*m)) {
-        let complaint = scene::messages::function_not_of_robot(function.name(), function.lacking(model));
-        options.scene.places.complain(&path_of(function), complaint, &mut diagnostics);
-    }
-    for (function, model) in options.scene.contacts.named().filter_map(|f| Some((f, of_frames?))) {
-        let (base, path) = (function.spec().base, format!("outputs.contact.{}", function.name()));
-        if !base.is_of(model) {
-            let complaint = scene::messages::function_not_of_robot(function.name(), base.lacking(model));
+    // functions of contact modes need what the function has whose inputs they take
+    let of_contacts = options.scene.contacts.named();
+    let of_contacts = of_contacts.map(|f| (f.name(), f.spec().base, format!("outputs.contact.{}", f.name())));
+    let named = functions.iter().map(|f| (f.name(), *f, path_of(f))).chain(of_contacts);
+    for ((name, function, path), model) in named.filter_map(|f| Some((f, of_frames?))) {
+        if !function.is_of(model) {
+            let complaint = scene::messages::function_not_of_robot(name, function.lacking(model));
             options.scene.places.complain(&path, complaint, &mut diagnostics);
         }
     }
