@@ -154,7 +154,7 @@ pub(super) fn unit<T: Real>(nv: usize, k: usize) -> Vec<T> {
 }
 
 /// Numbers that move at these rates.
-pub(super) fn with_rates<T: Real>(x: &[T], rates: &[T]) -> Vec<Dual<T, 1>> {
+pub(crate) fn with_rates<T: Real>(x: &[T], rates: &[T]) -> Vec<Dual<T, 1>> {
     x.iter().zip(rates).map(|(x, rate)| Dual { value: *x, derivatives: [*rate] }).collect()
 }
 

@@ -30,7 +30,7 @@ mod whole;
 
 pub use base_parameters::{base_parameter_lists, BaseParameterList};
 pub use contact::{ContactExtent, ContactFunction, ContactPort, ContactSpec, InModes, PerContact};
-pub(crate) use derivatives::along;
+pub(crate) use derivatives::{along, with_rates};
 pub(crate) use drives::may_be_articulated;
 pub use forms::{AlikeColumns, Forms, ForwardDynamicsMethod, LimbSums};
 pub use quantity::Quantity;

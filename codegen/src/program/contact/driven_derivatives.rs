@@ -5,8 +5,8 @@
 //! found. So links enter by the structured derivatives of inverse dynamics, contacts by their sweeps, and no factor of H is differentiated.
 
 use super::derivatives::{fixed, slopes, FoundMotion, MovedContacts};
-use super::equations::{supports, Added, CommonEquations, Footing};
-use crate::function::{along, by_rows, Function};
+use super::equations::{supports, Added, CommonEquations, DrivenContacts, Footing};
+use crate::function::{along, by_rows, with_rates, Function};
 use straightline_core::algorithms::{ContactRows, FunctionalCoordinates};
 use straightline_core::model::Model;
 use straightline_core::{algorithms as alg, Dual, Real};
@@ -40,15 +40,12 @@ impl<T: Real> MovingMotion<'_, T> {
         inputs: &Added<Dual<T, 1>>,
     ) -> DrivenChange<T> {
         let CommonEquations { constrained, options, epsilon, .. } = self.equations;
-        let with = |list: &[T], by: &[T]| -> Vec<Dual<T, 1>> {
-            list.iter().zip(by).map(|(x, by)| Dual { value: *x, derivatives: [*by] }).collect()
-        };
         let footings: Vec<&Footing<Dual<T, 1>>> = moved.footings.iter().collect();
         let of_contacts = moved.constrained();
         let (supports, own_rates) = supports(&footings, &of_contacts, options, inputs);
         let coordinates = FunctionalCoordinates {
             jacobian: constrained.jacobian.iter().map(|row| fixed(row)).collect(),
-            bias: with(&constrained.bias, &moved.along),
+            bias: with_rates(&constrained.bias, &moved.along),
             ..of_contacts
         };
         let rows = ContactRows {
@@ -57,7 +54,7 @@ impl<T: Real> MovingMotion<'_, T> {
             supports: &supports,
             ridge: Dual::fixed(*epsilon),
         };
-        let bias = with(&self.bias, of_bias);
+        let bias = with_rates(&self.bias, of_bias);
         let (motion, drives) = alg::driven_contact_motion(&self.model, (q, qd, x, u), &bias, &self.mass_matrix, rows);
         DrivenChange {
             of: [slopes(&motion.qdd), slopes(&drives.xd), slopes(&motion.force)],
@@ -70,7 +67,7 @@ impl<T: Real> CommonEquations<'_, T> {
     /// q̈, ẋ, F, and their derivatives by q, q̇, x, u and the objects' own coordinates.
     pub fn driven_forward_dynamics_derivatives(&self) -> Vec<Vec<T>> {
         let (nv, model, arguments) = (self.nv(), &self.bound.model, &self.bound.arguments);
-        let (motion, drives, own_rates) = self.driven_motion();
+        let DrivenContacts { bias, mass_matrix, applied, motion, drives, own_rates } = self.driven_motion();
         let found = FoundMotion { x: &motion.qdd, force: &motion.force, is_motion: true };
         let ([by_position, by_velocity], at_rest) = self.all_moved(&found);
         let of_links = self
@@ -78,31 +75,31 @@ impl<T: Real> CommonEquations<'_, T> {
         let moving = MovingMotion {
             equations: self,
             model: model.map(Dual::fixed),
-            bias: self.bias_force(),
-            mass_matrix: fixed(&self.mass_matrix()),
-            applied: self.applied().map(|rows| rows.iter().map(|row| fixed(row)).collect()),
+            bias,
+            mass_matrix: fixed(&mass_matrix),
+            applied: applied.map(|rows| rows.iter().map(|row| fixed(row)).collect()),
             held: [0, 1, 2, 3].map(|k| fixed(&arguments[k])),
         };
         let inputs = self.held_inputs();
         let at_rest_bias = vec![T::zero(); nv];
+        // the state where number k of q, q̇, x or u moves
+        let moved_at = |place: usize, k: usize| {
+            let mut at = moving.held.clone();
+            match place {
+                0 => at[0] = along(model, self.q(), k),
+                _ => at[place][k] = Dual::variable(arguments[place][k], 0),
+            }
+            at
+        };
         let by_state = |place: usize, moved: &[MovedContacts<'_, T>]| -> Vec<DrivenChange<T>> {
             let column = |(k, moved): (usize, &MovedContacts<'_, T>)| {
-                let mut at = moving.held.clone();
-                match place {
-                    0 => at[0] = along(model, self.q(), k),
-                    _ => at[place][k] = Dual::variable(arguments[place][k], 0),
-                }
                 let of_bias: Vec<T> = (0..nv).map(|i| of_links[(place * nv + i) * nv + k] - moved.pushed[i]).collect();
-                moving.change(&at, &of_bias, moved, &inputs)
+                moving.change(&moved_at(place, k), &of_bias, moved, &inputs)
             };
             moved.iter().enumerate().map(column).collect()
         };
         let by_drives = |place: usize| -> Vec<DrivenChange<T>> {
-            let column = |k: usize| {
-                let mut at = moving.held.clone();
-                at[place][k] = Dual::variable(arguments[place][k], 0);
-                moving.change(&at, &at_rest_bias, &at_rest, &inputs)
-            };
+            let column = |k: usize| moving.change(&moved_at(place, k), &at_rest_bias, &at_rest, &inputs);
             (0..arguments[place].len()).map(column).collect()
         };
         let columns = [by_state(0, &by_position), by_state(1, &by_velocity), by_drives(2), by_drives(3)];

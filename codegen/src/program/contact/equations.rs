@@ -117,6 +117,18 @@ pub(super) struct CommonEquations<'a, T> {
     pub epsilon: T,
 }
 
+/// A motion in contact under the inputs of the drives, and what it is made of.
+pub(super) struct DrivenContacts<T> {
+    pub bias: Vec<T>,
+    pub mass_matrix: Vec<T>,
+    /// The rows in which reactions act, if those are others.
+    pub applied: Option<Vec<Vec<T>>>,
+    pub motion: ConstrainedMotion<T>,
+    pub drives: DrivenMotion<T>,
+    /// The rates of the objects' own coordinates.
+    pub own_rates: Vec<Vec<T>>,
+}
+
 /// The results of a function, one list per output.
 pub(super) fn equations<T: Real>(
     robot: &Robot,
@@ -209,12 +221,12 @@ impl<T: Real> CommonEquations<'_, T> {
     }
 
     fn driven_forward_dynamics(&self) -> Vec<Vec<T>> {
-        let (motion, drives, own_rates) = self.driven_motion();
+        let DrivenContacts { motion, drives, own_rates, .. } = self.driven_motion();
         [vec![motion.qdd.clone(), drives.xd], of_rows(&motion), own_rates].concat()
     }
 
-    /// The motion under the inputs of the drives, what goes on in them, and the rates of the objects' own coordinates.
-    pub fn driven_motion(&self) -> (ConstrainedMotion<T>, DrivenMotion<T>, Vec<Vec<T>>) {
+    /// The motion under the inputs of the drives, with what it is made of.
+    pub fn driven_motion(&self) -> DrivenContacts<T> {
         let CommonEquations { bound, constrained, epsilon, .. } = self;
         let bias = self.bias_force();
         let (supports, own_rates) = supports(&self.footings(), constrained, self.options, self.added);
@@ -222,8 +234,9 @@ impl<T: Real> CommonEquations<'_, T> {
         let at = (&self.q()[..], &self.qd()[..], &bound.arguments[2][..], &bound.arguments[3][..]);
         let rows =
             ContactRows { coordinates: constrained, applied: applied.as_deref(), supports: &supports, ridge: *epsilon };
-        let (motion, drives) = alg::driven_contact_motion(&bound.model, at, &bias, &self.mass_matrix(), rows);
-        (motion, drives, own_rates)
+        let mass_matrix = self.mass_matrix();
+        let (motion, drives) = alg::driven_contact_motion(&bound.model, at, &bias, &mass_matrix, rows);
+        DrivenContacts { bias, mass_matrix, applied, motion, drives, own_rates }
     }
 
     fn inverse_dynamics(&self) -> Vec<Vec<T>> {
